@@ -75,12 +75,12 @@ def mujoco_forces(
 
 
 def drake_depths(
-    mesh: TetMesh, material: Material, radius: float, places: np.ndarray, forces: Sequence[float]
+    mesh: TetMesh, material: Material, radius: float, places: np.ndarray, forces: Sequence[float], law: str = "linear"
 ) -> tuple[np.ndarray, float]:
     """Return depths (places, forces), m, and the seconds of one step; arguments as of :func:`mujoco_forces`.
 
-    A linear deformable body under a sphere on a vertical slider that is pushed down by a constant force; hydroelastic
-    contact, which cannot be given a depth.
+    A deformable body, "linear" or "neo-hookean", under a sphere on a vertical slider that is pushed down by a constant
+    force; hydroelastic contact, which cannot be given a depth.
     """
     import time
 
@@ -92,7 +92,7 @@ def drake_depths(
         meshio.Mesh(mesh.nodes, [("tetra", mesh.tets)]).write(file, file_format="vtk42")
         for row, place in zip(depths, places, strict=True):
             for k, force in enumerate(forces):
-                row[k] = _drake_depth(file, material, radius, (*place, mesh.nodes[:, 2].max()), force)
+                row[k] = _drake_depth(file, material, radius, (*place, mesh.nodes[:, 2].max()), force, law)
                 steps += round(REST / DRAKE_STEP)
     return depths, (time.process_time() - started) / steps
 
@@ -120,13 +120,15 @@ def _mujoco_xml(mesh: TetMesh, material: Material, radius: float) -> str:
     </mujoco>"""
 
 
-def _drake_depth(file: Path, material: Material, radius: float, top: tuple[float, ...], force: float) -> float:
+def _drake_depth(
+    file: Path, material: Material, radius: float, top: tuple[float, ...], force: float, law: str
+) -> float:
     """Mean depth over the last part of the time."""
     from pydrake import all as drake
 
     builder = drake.DiagramBuilder()
     plant, _ = drake.AddMultibodyPlant(drake.MultibodyPlantConfig(time_step=DRAKE_STEP), builder)
-    slider = _drake_bodies(drake, plant, file, material, radius, top)
+    slider = _drake_bodies(drake, plant, file, material, radius, top, law)
     plant.mutable_gravity_field().set_gravity_vector(np.zeros(3))
     plant.Finalize()
     simulator = drake.Simulator(builder.Build())
@@ -139,14 +141,15 @@ def _drake_depth(file: Path, material: Material, radius: float, top: tuple[float
     return float(np.mean(depths[-round(AVERAGED / DRAKE_STEP) :]))
 
 
-def _drake_bodies(drake, plant, file: Path, material: Material, radius: float, top: tuple[float, ...]):
+def _drake_bodies(drake, plant, file: Path, material: Material, radius: float, top: tuple[float, ...], law: str):
     """Add the block, and the sphere that touches it; return the joint on which the sphere slides."""
     config = drake.DeformableBodyConfig()
     config.set_youngs_modulus(material.youngs_modulus)
     config.set_poissons_ratio(material.poissons_ratio)
     config.set_mass_density(material.density)
     config.set_stiffness_damping_coefficient(0.02)
-    config.set_material_model(drake.MaterialModel.kLinear)
+    models = {"linear": drake.MaterialModel.kLinear, "neo-hookean": drake.MaterialModel.kNeoHookean}
+    config.set_material_model(models[law])
     block = drake.GeometryInstance(drake.RigidTransform(), drake.Mesh(str(file), 1.0), "block")
     smooth = drake.CoulombFriction(0.0, 0.0)
     properties = drake.ProximityProperties()

@@ -17,6 +17,8 @@ import palpate
 from benches.output import Json, Out, Table, make_folder, print_written, show
 from benches.strain.bodies import CELL, Pressed, cuboids, cylinders, liver
 from benches.strain.cylinders import RADIUS
+from benches.strain.peers import beside_peers
+from benches.strain.peers import table as peers_table
 from benches.strain.ticks import sliding_ticks
 from palpate.scene import BuiltScene, Scene
 from palpate.scene.series import with_series
@@ -128,6 +130,7 @@ def strain(
     only: Annotated[str, typer.Option(help="Bodies whose names begin so, separated by commas.")] = "",
     places: Annotated[int, typer.Option(help="Places on the liver.")] = 4,
     ticks: Annotated[bool, typer.Option("--ticks", help="Time sliding ticks of A and B instead.")] = False,
+    peers: Annotated[bool, typer.Option("--peers", help="Press a column by MuJoCo and Drake instead.")] = False,
 ) -> None:
     """Press spheres into neo-Hookean bodies: errors of the linear law, A and B beside full Newton solutions.
 
@@ -137,6 +140,10 @@ def strain(
         first, second = sliding_ticks()
         for name, times in (("A", first), ("B", second)):
             print(f"{name}, sliding, us: median {times.median:.1f}, 99.9 % {times.p999:.1f}, worst {times.worst:.0f}")
+        return
+    if peers:
+        found = beside_peers()
+        show(as_json, found, peers_table(found))
         return
     folder, rows = make_folder(out), []
     for case in cases(cell, only, places):

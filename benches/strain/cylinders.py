@@ -55,7 +55,11 @@ class Cylinder:
         return palpate.Material(poissons_ratio=self.nu, law=self.law, **given, **constants)
 
     def mesh(self) -> palpate.TetMesh:
-        """Return elements that follow the circle at the rim."""
+        """Return 10-node elements that follow the circle at the rim."""
+        return self.corner_mesh().to_quadratic()
+
+    def corner_mesh(self) -> palpate.TetMesh:
+        """Return the same as 4-node elements."""
         axis, z = self._axes()
         x, y = np.meshgrid(axis, axis, indexing="ij")
         # Squares around the middle become circles towards the rim; the rim's polygon is scaled to the circle's area.
@@ -73,7 +77,7 @@ class Cylinder:
         for k, i, j in itertools.product(range(down), range(across), range(across)):
             corners = [number[k + c, i + a, j + b] for a, b, c in itertools.product((0, 1), repeat=3)]
             tets += [[corners[corner] for corner in tet] for tet in CUBOID]
-        return palpate.TetMesh(nodes, np.array(tets)).to_quadratic()
+        return palpate.TetMesh(nodes, np.array(tets))
 
     def _axes(self) -> tuple[np.ndarray, np.ndarray]:
         """Return coordinates across and down, m."""
@@ -84,9 +88,9 @@ class Cylinder:
         across, down = 2 * max(1, round(self.radius / EDGE)), max(2, round(self.height / EDGE))
         return np.linspace(-self.radius, self.radius, across + 1), np.linspace(-self.height, 0.0, down + 1)
 
-    def body(self) -> palpate.Body:
-        """Return the body with its supports."""
-        mesh = self.mesh()
+    def body(self, linear: bool = False) -> palpate.Body:
+        """Return the body with its supports, of 10-node elements or of 4-node ones."""
+        mesh = self.corner_mesh() if linear else self.mesh()
         places = mesh.nodes
         fixed = np.zeros(places.shape, bool)
         bottom = places[:, 2] < -self.height + 1e-9
@@ -101,9 +105,9 @@ class Cylinder:
             fixed[np.hypot(places[:, 0], places[:, 1]) > 0.97 * self.radius] = True
         return palpate.Body(mesh, material=self.material(), fixed=fixed)
 
-    def built(self, folder: Path, tool: dict) -> BuiltScene:
+    def built(self, folder: Path, tool: dict, linear: bool = False) -> BuiltScene:
         """Scene with one tool; only the middle of the top may be touched."""
-        body = self.body()
+        body = self.body(linear)
         places = body.mesh.nodes[body.mesh.surface_nodes]
         near = (places[:, 2] > -1e-9) & (np.hypot(places[:, 0], places[:, 1]) < TOUCHED)
         green = palpate.precompute(
@@ -113,9 +117,9 @@ class Cylinder:
         scene = Scene(body=table, tool=[tool], device=UNLIMITED, view={"strain_limit": 0.0})
         return BuiltScene.of(scene, body, green)
 
-    def pressed(self, folder: Path, series: bool = True) -> tuple[np.ndarray, np.ndarray]:
+    def pressed(self, folder: Path, series: bool = True, linear: bool = False) -> tuple[np.ndarray, np.ndarray]:
         """Press the sphere to all depths; return forces, N, and stated errors."""
-        built = self.built(folder, sphere(RADIUS, 0.0))
+        built = self.built(folder, sphere(RADIUS, 0.0), linear)
         deepest = max(self.depths)
         down = np.linspace(0.0005, -deepest, int(np.ceil((deepest + 0.0005) / 2e-5)) + 1)
         path = np.column_stack([0 * down, 0 * down, RADIUS + down])

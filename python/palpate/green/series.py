@@ -33,10 +33,11 @@ def force_series(
     Returns
     -------
     fields, positions
-        (k, 8) and (k, 3), m, at the smooth sides of the surface nodes. With the outward normal `n` and the pressing
+        (k, 9) and (k, 3), m, at the smooth sides of the surface nodes. With the outward normal `n` and the pressing
         force `F = -n . f` of a force `f` on the body, `U = F^2 b_3 . f + F^3 b_4 . f` is added to its complementary
-        energy: `b_3` (m/N^2), `b_4` (m/N^3), `1/F_e` (1/N) of the force at which the series ends, and the hardening
-        `kappa` (1/N^2): `F^3` stands for a function that grows more slowly (docs/theory.md, chapter 11).
+        energy: `b_3` (m/N^2), `b_4` (m/N^3), `1/F_e` (1/N) of the force at which the series ends, and `kappa` (1/N^2)
+        and `alpha` (1/N) of a body that hardens, where `F^2` and `F^3` stand for functions that grow more slowly
+        (docs/theory.md, chapter 11).
 
     """
     if green.path is None or body.loads is not None or not is_hyperelastic(body):

@@ -32,6 +32,27 @@ def test_a_column_has_the_force_of_a_full_solution(nu, tmp_path):
     assert np.abs(forces / column.forces - 1.0).max() < 0.02
 
 
+def test_a_plate_that_hardens_is_followed_to_one_and_a_half_thicknesses(tmp_path):
+    """A series in powers of the force turns back at one thickness."""
+    (plate,) = (body for body in references(0.006) if body.name == "plate")
+    forces, stated = plate.pressed(tmp_path)
+    errors = np.abs(forces / plate.forces - 1.0)
+    assert errors.max() < 0.09
+    assert errors[2:].max() < 0.05
+    assert (errors < stated).all()
+
+
+@pytest.mark.parametrize("thickness", ["0.01", "0.015"])
+def test_a_glued_layer_has_the_force_of_a_full_solution(thickness, tmp_path):
+    """With the compliance of a patch as wide as the layer is thick it would be 9 to 12 % off on the thinner one."""
+    (layer,) = (body for body in references(0.006) if body.name == f"layer {thickness}")
+    forces, stated = layer.pressed(tmp_path)
+    errors = np.abs(forces / layer.forces - 1.0)
+    # To 30 % of the thickness.
+    assert errors[:3].max() < 0.06
+    assert (errors < stated).all()
+
+
 def test_a_round_ellipsoid_has_the_force_and_the_work_of_a_sphere(tmp_path):
     body = BODIES["block 0.025 0.45"]
     built = body.built(tmp_path, {"shape": "ellipsoid", "semi_axes": [RADIUS] * 3, "contact": "local", "friction": 0.0})
@@ -47,7 +68,7 @@ def test_a_round_ellipsoid_has_the_force_and_the_work_of_a_sphere(tmp_path):
     forces = -recording.forces
     work = np.cumsum((0.5 * (forces[1:] + forces[:-1]) * np.diff(path, axis=0)).sum(axis=1))
     assert abs(work[-1]) < 2e-3 * work.max()
-    assert 0.01 < contacts["error"].max() < 0.1
+    assert 0.01 < contacts["error"].max() < 0.12
 
 
 @pytest.mark.slow

@@ -6,7 +6,11 @@ use super::{MAX_PATCH_NODES, Patch, PatchGeometry, PatchScratch, Refusal, Surfac
 use crate::green::GreensFunction;
 use crate::green::accuracy::{Pressed, PressedError, largest, relative};
 use crate::math::{acos, cos};
+use crate::tensor::outer;
 use crate::{Error, Result};
+
+/// Sweeps of Jacobi's method; four give all digits.
+const JACOBI_SWEEPS: usize = 6;
 
 /// Smallest eigenvalue of a symmetric 3x3 matrix (closed form by the angle of the characteristic cubic; Smith, 1961).
 pub fn smallest_eigenvalue(m: &DMat3) -> f64 {
@@ -20,6 +24,32 @@ pub fn smallest_eigenvalue(m: &DMat3) -> f64 {
     }
     let r = (deviator.determinant() / (2.0 * p * p * p)).clamp(-1.0, 1.0);
     mean + 2.0 * p * cos(acos(r) / 3.0 + 2.0 * std::f64::consts::FRAC_PI_3)
+}
+
+/// A symmetric 3x3 matrix whose eigenvalues below `least` are raised to it, each along its own direction, by cyclic rotations
+/// (Jacobi). Raising all directions by what one of them lacks would soften the others.
+pub fn raise_eigenvalues(matrix: &DMat3, least: f64) -> DMat3 {
+    if smallest_eigenvalue(matrix) >= least {
+        return *matrix;
+    }
+    let (mut diagonal, mut axes) = (*matrix, DMat3::IDENTITY);
+    for (i, k) in [(0, 1), (0, 2), (1, 2)].into_iter().cycle().take(3 * JACOBI_SWEEPS) {
+        let off = diagonal.col(i)[k];
+        if off == 0.0 {
+            continue;
+        }
+        let theta = (diagonal.col(k)[k] - diagonal.col(i)[i]) / (2.0 * off);
+        let tangent = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
+        let cosine = 1.0 / (tangent * tangent + 1.0).sqrt();
+        let sine = tangent * cosine;
+        let mut rotation = DMat3::IDENTITY;
+        (rotation.col_mut(i)[i], rotation.col_mut(k)[k]) = (cosine, cosine);
+        (rotation.col_mut(i)[k], rotation.col_mut(k)[i]) = (-sine, sine);
+        diagonal = rotation.transpose() * diagonal * rotation;
+        axes *= rotation;
+    }
+    let missing = [0, 1, 2].map(|k| outer(axes.col(k), axes.col(k)) * (least - diagonal.col(k)[k]).max(0.0));
+    *matrix + missing[0] + missing[1] + missing[2]
 }
 
 /// Response to a pressed patch.
@@ -116,4 +146,23 @@ fn constrained_stiffness(compliance: &DMat3, prescribed: [bool; 3]) -> Option<DM
     }
     let stiffness = matrix.inverse();
     (scale > 0.0 && stiffness.is_finite()).then_some(stiffness)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn eigenvalues_are_raised_along_their_own_directions() {
+        let (first, second) = (DVec3::new(0.6, 0.0, 0.8), DVec3::new(0.0, 1.0, 0.0));
+        let third = first.cross(second);
+        let of = |values: [f64; 3]| {
+            outer(first, first) * values[0] + outer(second, second) * values[1] + outer(third, third) * values[2]
+        };
+        let found = raise_eigenvalues(&of([-2.0, 0.3, -1.5]), -1.0);
+        assert!(found.abs_diff_eq(of([-1.0, 0.3, -1.0]), 1e-14), "{found}");
+        // Those above the bound stay, to the bit.
+        assert_eq!(raise_eigenvalues(&of([-0.5, 0.3, 0.2]), -1.0), of([-0.5, 0.3, 0.2]));
+        assert!(raise_eigenvalues(&of([-3.0; 3]), -1.0).abs_diff_eq(DMat3::IDENTITY * -1.0, 1e-14));
+    }
 }

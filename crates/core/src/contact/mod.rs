@@ -22,7 +22,7 @@ mod touch_patch;
 
 pub(crate) use closest::barycentric;
 pub use closest::{SurfacePoint, SurfaceQuery};
-pub use compliance::{Touch, smallest_eigenvalue, touch};
+pub use compliance::{Touch, raise_eigenvalues, smallest_eigenvalue, touch};
 pub use concavities::Concavities;
 pub use local::SeriesFields;
 #[cfg(feature = "offline")]

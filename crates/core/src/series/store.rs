@@ -9,7 +9,7 @@ use crate::contact::local::{SERIES_FIELDS, StrainLaw};
 use crate::green::{Problem, Progress};
 
 /// Version of the computation and of the file's layout; part of the key.
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 const KIND: ArraysKind = ArraysKind { format: "palpate-series", name: "file of series", version: VERSION };
 /// Digits of the key in the name of a file.
 const DIGITS: usize = 16;

@@ -140,7 +140,8 @@ fn regular_compliance(body: &BodyModel, tool: &ToolModel) -> Result<Option<Arc<R
     })?;
     let (green, geometry) = (&*body.green, &body.geometry);
     let (smooth, moduli, moves) = (&local.smooth, &local.moduli, body.moves());
-    let compliant = CompliantBody { green, geometry, smooth, moduli, moves };
+    let inverse_sizes = &local.inverse_sizes;
+    let compliant = CompliantBody { green, geometry, smooth, moduli, inverse_sizes, moves };
     let mut regular = RegularCompliance::load_or_compute(compliant, tool.radius, tool.max_stiffness);
     // A body in motion is displaced by its modes, which are linear.
     if !moves && !tool.shape.needs_cells() {

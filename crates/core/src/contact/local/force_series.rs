@@ -8,13 +8,14 @@
 //!
 //! is added to the linear `f^T C_reg f / 2`.
 //!
-//! A plate that is clamped hardens as it bends. Its displacement `q = c_1 F + c_2 F^2 - c_3 F^3` has a maximum at about one thickness.
-//! A series in `y`, where `F = y + kappa y^3` and `kappa = c_3/c_1`, has none. So where `c_3 > 0`, `F^2` and `F^3` are
-//! replaced by the `P_2(F)`, `P_3(F)` for which `q = c_1 y + c_2 y^2`: their displacements are `d(F P_2)/dF = 3 y^2` and, with
-//! `y = F - kappa h`, `d(F P_3)/dF = 4 h = 4 y^3`. They are `F^2` and `F^3` for small forces:
+//! A plate that is clamped hardens as it bends: its displacement `q = c_1 F + c_2 F^2 + c_3 F^3` with `c_3 < 0` has a maximum at
+//! about one thickness. The force as a function of the displacement, `F = y + alpha y^2 + kappa y^3` of `y = q/c_1`, has none. So in
+//! such a body `F^2` and `F^3` are replaced by functions `P_2(F)`, `P_3(F)` whose displacements are powers of `y`,
+//! `d(F P_2)/dF = 3 y^2` and `d(F P_3)/dF = 4 y^3`. They are `F^2` and `F^3` for small forces:
 //!
 //! ```text
-//! F P_2 = y^3 + 9/5 kappa y^5    F P_3 = y^4 + 2 kappa y^6    dP_2/dkappa = -6/5 y^5/F    dP_3/dkappa = -2 y^6/F
+//! F P_2 = y^3 + 3/2 alpha y^4 + 9/5 kappa y^5        F P_3 = y^4 + 8/5 alpha y^5 + 2 kappa y^6
+//! dP_2/dalpha = -3/2 y^4/F    dP_2/dkappa = -6/5 y^5/F    dP_3/dalpha = -12/5 y^5/F    dP_3/dkappa = -2 y^6/F
 //! ```
 //!
 //! Terms of the second and higher order in the tangential force are left out: without
@@ -29,16 +30,18 @@ use crate::contact::smooth::Blended;
 use crate::tensor::outer;
 
 /// Numbers at a fan.
-pub const SERIES_FIELDS: usize = 8;
-/// `b_3` (m/N^2), `b_4` (m/N^3), `1/F_e` (1/N) and `kappa` (1/N^2) at a fan. All are zero where no series is known.
+pub const SERIES_FIELDS: usize = 9;
+/// `b_3` (m/N^2), `b_4` (m/N^3), `1/F_e` (1/N), `kappa` (1/N^2) and `alpha` (1/N) at a fan. All are zero where no series is known.
 pub type SeriesFields = [f64; SERIES_FIELDS];
 /// Fields of `b_3`, of `b_4` and of `1/F_e`.
 const CUBIC: usize = 0;
 const QUARTIC: usize = 3;
 const ENDING: usize = 6;
 const HARDENING: usize = 7;
-/// Newton steps to `y`; four give all digits.
+const BENDING: usize = 8;
+/// Newton steps to `y`; four give all digits. None follows one shorter than this part of the force.
 const STEPS: usize = 6;
+const SETTLED: f64 = 1e-9;
 
 /// Displacement, energy and their derivatives at one force.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,58 +75,78 @@ impl Default for HigherOrders {
     }
 }
 
-/// A function of the pressing force, with its derivatives by the force, by `F_e` and by `kappa`.
+impl HigherOrders {
+    /// At a force changed by a little: displacement and energy to the first and second order.
+    pub fn moved(&self, change: DVec3) -> Self {
+        let more = self.compliance * change;
+        let displacement = self.displacement + more;
+        Self { displacement, energy: self.energy + change.dot(self.displacement + more * 0.5), ..*self }
+    }
+}
+
+/// A function of the pressing force, with its derivatives by the force, by `F_e`, and by `alpha` and `kappa`.
 #[derive(Clone, Copy, Debug)]
 struct Power {
     value: f64,
     slope: f64,
     curvature: f64,
     by_ending: f64,
-    by_hardening: f64,
-    slope_by_hardening: f64,
+    by_terms: [f64; 2],
+    slope_by_terms: [f64; 2],
 }
 
-impl Power {
+/// `y` of `F = y + alpha y^2 + kappa y^3`, and what both functions of it share.
+#[derive(Clone, Copy, Debug)]
+struct HardeningSpring {
+    inverse_force: f64,
+    y: f64,
+    /// `alpha y` and `kappa y^2`.
+    terms: [f64; 2],
+    /// `dy/dF`.
+    by_force: f64,
+}
+
+impl HardeningSpring {
+    fn new(force: f64, [bending, hardening]: [f64; 2]) -> Self {
+        let y = hardened(force, [bending, hardening]);
+        let terms = [bending * y, hardening * y * y];
+        Self { inverse_force: 1.0 / force, y, terms, by_force: 1.0 / (1.0 + 2.0 * terms[0] + 3.0 * terms[1]) }
+    }
+
     /// `P_2`.
-    fn hardening_square(force: f64, hardening: f64) -> Self {
-        let y = hardened(force, hardening);
-        let square = y * y;
-        let bent = hardening * square;
-        let by_force = 1.0 / (1.0 + 3.0 * bent);
-        // F P_2' = 3 y^2 - P_2.
-        let value = square * (1.0 + 1.8 * bent) / (1.0 + bent);
-        let slope = (3.0 * square - value) / force;
-        let by_hardening = -1.2 * square * square * y / force;
-        Self {
-            value,
-            slope,
-            curvature: (6.0 * y * by_force - 2.0 * slope) / force,
-            by_ending: 0.0,
-            by_hardening,
-            slope_by_hardening: (-6.0 * square * square * by_force - by_hardening) / force,
-        }
+    fn square(&self) -> Power {
+        self.power(2.0, [1.5, 1.8], self.y)
     }
 
     /// `P_3`.
-    fn hardening_cube(force: f64, hardening: f64) -> Self {
-        let y = hardened(force, hardening);
-        let square = y * y;
-        let bent = hardening * square;
-        let by_force = 1.0 / (1.0 + 3.0 * bent);
-        // F P_3' = 4 y^3 - P_3.
-        let value = square * y * (1.0 + 2.0 * bent) / (1.0 + bent);
-        let slope = (4.0 * square * y - value) / force;
-        let by_hardening = -2.0 * square * square * square / force;
-        Self {
-            value,
-            slope,
-            curvature: (12.0 * square * by_force - 2.0 * slope) / force,
-            by_ending: 0.0,
-            by_hardening,
-            slope_by_hardening: (-12.0 * square * square * y * by_force - by_hardening) / force,
-        }
+    fn cube(&self) -> Power {
+        self.power(3.0, [1.6, 2.0], self.y * self.y)
     }
 
+    /// `P_k` with `F P_k = y^(k+1) (1 + s_1 alpha y + s_2 kappa y^2)` and `d(F P_k)/dF = (k + 1) y^k`; `lower` is `y^(k-1)`.
+    fn power(&self, order: f64, shares: [f64; 2], lower: f64) -> Power {
+        let Self { inverse_force, y, terms, by_force } = *self;
+        let (count, power, square) = (order + 1.0, lower * y, y * y);
+        let whole = 1.0 + shares[0] * terms[0] + shares[1] * terms[1];
+        // F = y (1 + alpha y + kappa y^2), and F P_k' = (k + 1) y^k - P_k.
+        let value = power * whole / (1.0 + terms[0] + terms[1]);
+        let slope = (count * power - value) * inverse_force;
+        let rise = count * order * lower * by_force;
+        // dy/dalpha = -y^2 dy/dF and dy/dkappa = -y^3 dy/dF.
+        let moved = [square, square * y];
+        let by_terms = [0, 1].map(|k| (shares[k] - count) * power * moved[k] * inverse_force);
+        Power {
+            value,
+            slope,
+            curvature: (rise - 2.0 * slope) * inverse_force,
+            by_ending: 0.0,
+            by_terms,
+            slope_by_terms: [0, 1].map(|k| (-rise * moved[k] - by_terms[k]) * inverse_force),
+        }
+    }
+}
+
+impl Power {
     /// The function straight beyond `ending`, where `self` is its value there.
     fn straight_from(self, ending: f64, force: f64) -> Self {
         let beyond = force - ending;
@@ -131,21 +154,26 @@ impl Power {
             value: self.value + self.slope * beyond,
             curvature: 0.0,
             by_ending: self.curvature * beyond,
-            by_hardening: self.by_hardening + self.slope_by_hardening * beyond,
+            by_terms: [0, 1].map(|k| self.by_terms[k] + self.slope_by_terms[k] * beyond),
             ..self
         }
     }
 }
 
-/// `y` of `F = y + kappa y^3`.
-fn hardened(force: f64, hardening: f64) -> f64 {
+/// `y` of `F = y + alpha y^2 + kappa y^3`, which grows with the force: `3 kappa > alpha^2`.
+fn hardened(force: f64, [bending, hardening]: [f64; 2]) -> f64 {
     let bent = 1.0 + hardening * force * force;
     let (half, quarter) = (bent.sqrt(), bent.sqrt().sqrt());
     // Close to F / bent^(1/3) for all forces.
     let mut y = force / (half / (quarter / quarter.sqrt()));
     for _ in 0..STEPS {
-        let bent = hardening * y * y;
-        y -= (y + bent * y - force) / (1.0 + 3.0 * bent);
+        let [second, third] = [bending * y, hardening * y * y];
+        let step = (y + second * y + third * y - force) / (1.0 + 2.0 * second + 3.0 * third);
+        y -= step;
+        // The error is about the square of the relative step.
+        if step.abs() < SETTLED * force {
+            break;
+        }
     }
     y
 }
@@ -166,26 +194,27 @@ pub fn higher_orders(
     }
     let ending = 1.0 / inverse_ending;
     let inward = -normal;
+    let harder = [BENDING, HARDENING].map(|field| fields.slope(field));
     let mut found = HigherOrders { fraction: pressing * inverse_ending, ..HigherOrders::default() };
     let within = pressing.min(ending);
-    let hardening = fields.values[HARDENING];
-    let powers =
-        [(CUBIC, Power::hardening_square(within, hardening)), (QUARTIC, Power::hardening_cube(within, hardening))];
+    let spring = HardeningSpring::new(within, [BENDING, HARDENING].map(|field| fields.values[field]));
+    let powers = [(CUBIC, spring.square()), (QUARTIC, spring.cube())];
     let (mut by_pressing, mut by_ending) = (0.0, 0.0);
     for (first, at_most) in powers {
         let power = if pressing > ending { at_most.straight_from(ending, pressing) } else { at_most };
-        let Power { value, slope, curvature, by_hardening, slope_by_hardening, .. } = power;
+        let Power { value, slope, curvature, by_terms, slope_by_terms, .. } = power;
         let b = DVec3::from_slice(&fields.values[first..first + 3]);
         let along = b.dot(force);
         found.displacement += inward * (slope * along) + b * value;
         found.compliance += outer(inward, inward) * (curvature * along) + (outer(inward, b) + outer(b, inward)) * slope;
         found.energy += value * along;
         let gradient: DVec3 = (0..3).map(|axis| fields.slope(first + axis) * force[axis]).sum();
-        let harder = fields.slope(HARDENING);
-        found.slope += gradient * value + harder * (by_hardening * along);
+        found.slope += gradient * value + (harder[0] * by_terms[0] + harder[1] * by_terms[1]) * along;
         let by_component = DMat3::from_cols(fields.slope(first), fields.slope(first + 1), fields.slope(first + 2));
         found.slope_by_force += by_component * value + outer(gradient, inward) * slope;
-        found.slope_by_force += outer(harder, b * by_hardening + inward * (slope_by_hardening * along));
+        for k in 0..2 {
+            found.slope_by_force += outer(harder[k], b * by_terms[k] + inward * (slope_by_terms[k] * along));
+        }
         by_pressing += slope * along;
         by_ending += power.by_ending * along;
     }
@@ -204,7 +233,7 @@ mod tests {
     fn fields(at: DVec3) -> Blended<SERIES_FIELDS> {
         let slopes: [DVec3; SERIES_FIELDS] =
             std::array::from_fn(|k| DVec3::new(0.2 * k as f64 - 0.5, 0.3, -0.1 * k as f64) * 0.3);
-        let start = [0.2, -0.3, 0.5, -0.1, 0.07, 0.11, 0.8, 1.3];
+        let start = [0.2, -0.3, 0.5, -0.1, 0.07, 0.11, 0.8, 1.3, -0.4];
         let values = std::array::from_fn(|k| start[k] + slopes[k].dot(at));
         Blended::from_parts(values, slopes)
     }
@@ -235,19 +264,36 @@ mod tests {
         }
     }
 
-    /// Displacements of a spring `F = y + kappa y^3` are those of both functions, which are powers of the force at small ones.
+    /// Displacements of a spring `F = y + alpha y^2 + kappa y^3` are those of both functions, which are powers of the force at
+    /// small ones.
     #[test]
     fn a_hardening_spring_is_followed() {
-        for (hardening, force) in [(0.7, 0.02), (0.7, 1.0), (0.7, 30.0), (0.0, 2.0)] {
-            let y = hardened(force, hardening);
-            assert!((y + hardening * y.powi(3) - force).abs() < 1e-14 * force, "{force}");
-            let p = Power::hardening_cube(force, hardening);
-            // y = F - kappa d(F P)/dF / 4.
-            let displacement = force - hardening * 0.25 * (p.value + force * p.slope);
-            assert!((displacement - y).abs() < 1e-13 * force);
-            let square = Power::hardening_square(force, hardening);
+        for (terms, force) in [([-0.6, 0.7], 0.02), ([0.5, 0.7], 1.0), ([-1.1, 0.7], 30.0), ([0.0; 2], 2.0)] {
+            let [bending, hardening] = terms;
+            let spring = HardeningSpring::new(force, terms);
+            let y = spring.y;
+            assert!((y + bending * y * y + hardening * y.powi(3) - force).abs() < 1e-13 * force, "{force}");
+            let [square, cube] = [spring.square(), spring.cube()];
+            // y = F - alpha d(F P_2)/dF / 3 - kappa d(F P_3)/dF / 4.
+            let [second, third] = [square, cube].map(|power| power.value + force * power.slope);
+            assert!((force - bending * second / 3.0 - hardening * third / 4.0 - y).abs() < 1e-13 * force);
             assert!((square.value + force * square.slope - 3.0 * y * y).abs() < 1e-13 * force * force);
-            assert!(hardening * force * force > 1e-3 || (p.value / force.powi(3) - 1.0).abs() < 2e-3);
+            assert!(force > 0.1 || (cube.value / force.powi(3) - 1.0).abs() < 5e-2);
+            let h = 1e-6;
+            for k in 0..2 {
+                let moved = |by: f64| {
+                    let mut terms = terms;
+                    terms[k] += by;
+                    let spring = HardeningSpring::new(force, terms);
+                    [spring.square(), spring.cube()]
+                };
+                for (power, (high, low)) in [square, cube].iter().zip(moved(h).into_iter().zip(moved(-h))) {
+                    assert!(((high.value - low.value) / (2.0 * h) - power.by_terms[k]).abs() < 1e-6 * force.powi(3));
+                    assert!(
+                        ((high.slope - low.slope) / (2.0 * h) - power.slope_by_terms[k]).abs() < 1e-6 * force.powi(2)
+                    );
+                }
+            }
         }
     }
 

@@ -69,8 +69,8 @@ impl Friction {
         if self.stiffness > 0.0 { 0.5 * SPRINGS as f64 * squares / self.stiffness } else { 0.0 }
     }
 
-    /// Force of all springs, N.
-    fn force(&self) -> DVec3 {
+    /// Force of all springs on the body, N.
+    pub fn force(&self) -> DVec3 {
         DVec3::from_array(self.springs.map(total))
     }
 

@@ -23,6 +23,9 @@ const STEEPEST_INCLINATION: f64 = 0.5;
 /// Least guess of the force from which a turned contact is followed, and its largest change from the guess, over the force.
 const LEAST_GUESS: f64 = 0.5;
 const LARGEST_CHANGE: f64 = 0.5;
+/// Change of the force from the guess, over the force, up to which higher orders follow from their derivatives at the guess. A
+/// converged change is below 1e-7.
+const CLOSE: f64 = 1e-2;
 
 /// Effect of the other contacts of the body at a contact.
 #[derive(Clone, Copy, Debug, Default)]
@@ -66,8 +69,11 @@ pub struct LocalResponse {
     pub slope: DVec3,
     pub turn: DVec3,
     pub friction: FrictionResponse,
-    /// Higher orders of the body's displacement, at the force.
+    /// Derivative of the force by friction by the position, N/m.
+    pub friction_by_position: DMat3,
+    /// Higher orders of the body's displacement, at the force, and at the guess.
     pub higher: HigherOrders,
+    higher_at_guess: HigherOrders,
     series: Option<Blended<SERIES_FIELDS>>,
     scale: f64,
     /// Offset of the tool along the surface from above its contact, m, and its distance from the contact, m.
@@ -156,6 +162,7 @@ fn evaluate_sphere(
     response.guess = ForceGuess { force: guess.force, friction: guess.friction, offset: guess.offset };
     if response.series.is_some() {
         let higher = response.higher_orders_at(guess.force);
+        response.higher_at_guess = higher;
         response.slope += higher.slope;
         response.slope_by_force = compliance_slope(body, guess.force, &fields) + higher.slope_by_force;
     }
@@ -185,6 +192,7 @@ fn evaluate_shape(
             jacobian: DMat3::ZERO,
             slope_by_force: DMat3::ZERO,
             offset_by_position: DMat3::ZERO,
+            friction_by_position: DMat3::ZERO,
             ..LocalResponse::default()
         });
     };
@@ -301,6 +309,7 @@ impl LocalResponse {
             slope_by_force,
             offset_by_position: DMat3::ZERO,
             offset_by_force: DMat3::ZERO,
+            friction_by_position: DMat3::ZERO,
             ..Self::default()
         }
     }
@@ -341,15 +350,19 @@ impl LocalResponse {
         let bound = tool.coefficient * pressing;
         self.friction = contact.friction.respond(displacement, bound, tool.coefficient, stiffness, self.normal);
         self.force = self.friction.force - push;
-        self.higher = self.higher_orders_at(self.force);
+        let change = self.force - self.guess.force;
+        self.higher = match change.length_squared() < (CLOSE * CLOSE) * self.force.length_squared() {
+            true => self.higher_at_guess.moved(change),
+            false => self.higher_orders_at(self.force),
+        };
         let n = self.foot.normal;
         let turning = match tool.shape {
             ToolShape::Sphere { .. } => self.foot.turning,
             shape => bounded(self.foot.turning, 1.0 / shape.thickness()),
         };
-        self.jacobian = outer(n, n) * indentation.stiffness - turning * indentation.force
-            + self.friction.by_displacement
-            - outer(self.friction.by_pressing, n) * indentation.stiffness;
+        self.friction_by_position =
+            self.friction.by_displacement - outer(self.friction.by_pressing, n) * indentation.stiffness;
+        self.jacobian = outer(n, n) * indentation.stiffness - turning * indentation.force + self.friction_by_position;
         if self.series.is_some() {
             self.jacobian = self.turning * self.jacobian;
             self.offset_by_position = self.offset_by_force * self.jacobian;

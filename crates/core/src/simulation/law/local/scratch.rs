@@ -85,6 +85,7 @@ impl LocalScratch {
             self.positions[a] += self.steps[a];
             let response = &mut self.responses[a];
             response.force += response.jacobian * self.steps[a];
+            response.friction.force += response.friction_by_position * self.steps[a];
             response.offset += response.offset_by_position * self.steps[a];
         }
     }

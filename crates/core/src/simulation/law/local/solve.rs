@@ -172,7 +172,8 @@ fn solve_equations(
         local.responses[a].force = contact.local.force;
         local.responses[a].foot = contact.local.foot;
         local.responses[a].offset = contact.local.offset;
-        local.responses[a].friction = FrictionResponse::default();
+        local.responses[a].friction =
+            FrictionResponse { force: contact.local.friction.force(), ..FrictionResponse::default() };
     }
     let cells = slots.iter().any(|&slot| contact_needs_cells(model, state, slot));
     let (most, [step_factor, force_factor]) =
