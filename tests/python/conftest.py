@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import faulthandler
 import os
 
 import numpy as np
@@ -8,6 +9,9 @@ import scipy.sparse.linalg
 
 import palpate
 from palpate.mesh import TetMesh
+
+# Standard error of the process itself, whatever captures that of a test.
+STDERR = os.fdopen(os.dup(2), "w")
 
 
 def pytest_addoption(parser):
@@ -26,6 +30,22 @@ def pytest_runtest_makereport(item, call):
         report.longrepr = (
             f"skipped, and --no-skips was given: {call.excinfo.value if call.excinfo else report.longrepr}"
         )
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item):
+    """End the process of a test that outlasts its limit by a minute, with all stacks printed: another takes its place.
+
+    pytest-timeout raises an exception, which Playwright's event loop swallows, and code that holds the interpreter's
+    lock never sees.
+    """
+    marker = item.get_closest_marker("timeout")
+    limit = float(marker.args[0] if marker and marker.args else item.config.getini("timeout"))
+    faulthandler.dump_traceback_later(limit + 60, exit=True, file=STDERR)
+    try:
+        return (yield)
+    finally:
+        faulthandler.cancel_dump_traceback_later()
 
 
 def thin_campaigns(config, items) -> None:
