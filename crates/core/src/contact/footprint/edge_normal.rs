@@ -2,16 +2,18 @@
 //!
 //! The mean of the pieces' own normals `n_i` turns over from one side of a blade to the other while the tool moves by a fraction of its
 //! radius. The gradient `t_i` of the tool's distance, from a piece towards the tool, does not. So a share `c` of the contact's
-//! normal is the tool's,
+//! normal is the tool's. With the means `N` of the normals, `X` of the places and `D` of `t_i - n_i`, the tool's half width `h`, and
+//! the weight `v` of walls beside the contact,
 //!
 //! ```text
-//! n ~ sum w_i (n_i + c (t_i - n_i))        c = step((mean(n_i . x_i) - N . X)/h) (1 - step(v/(v + sum w_i)))
+//! n ~ sum w_i (n_i + c (t_i - n_i))        c = edge bulge (1 - step(v/(v + sum w_i)))
+//! bulge = step((mean(n_i . x_i) - N . X)/h)        1 - edge = (1 - step(1 - N^2)) (1 - step(|D - n_0 (n_0 . D)|))
 //! ```
 //!
-//! with the means `N` of the normals and `X` of the places, the tool's half width `h`, and the weight `v` of walls beside the contact.
-//! The first factor is zero in creases, where the tool's normals point from one wall to the other. The second is zero beside
-//! a wall: the contact's pieces end there as at an edge, and the body does not. On a plane both normals are the same, for
-//! `sum w_i t_i` along it is the integral of the gradient of a function that ends at zero.
+//! with `n_0 = N/|N|`. On planes and round bodies `edge` is zero: all normals are alike there, and the tool's are theirs in the
+//! mean, but for the error of a sum over few pieces. On an edge the first differ, on one side of a blade the second.
+//! `bulge` is zero in creases, where the tool's normals point from one wall to the other. The last factor is zero beside
+//! a wall: the contact's pieces end there as at an edge, and the body does not.
 
 use glam::{DMat3, DVec3};
 
@@ -25,70 +27,81 @@ const OWN_NORMAL: [f64; 2] = [-0.75, -0.25];
 const BULGING: [f64; 2] = [-0.02, 0.0];
 /// Share of walls in what is near the tool from which the contact lies in a hollow, and fully so.
 const WALLS: [f64; 2] = [0.0, 0.1];
-/// Length of the mean difference of the tool's normals and the pieces' own, up to which the contact has its own normal, and from which
-/// it has the tool's.
-fn apart() -> [f64; 2] {
-    static S: std::sync::OnceLock<[f64; 2]> = std::sync::OnceLock::new();
-    *S.get_or_init(|| {
-        let s = std::env::var("APART").unwrap_or("0.1,0.3".into());
-        let v: Vec<f64> = s.split(',').map(|x| x.parse().unwrap()).collect();
-        [v[0], v[1]]
-    })
-}
-
+/// Length of the mean difference of the tool's normals and the pieces' own, across the latter, up to which the contact has its own
+/// normal, and from which it has the tool's. Pieces of a plane that are nearly as large as the tool differ by 0.05.
+const APART: [f64; 2] = [0.1, 0.3];
+/// Spread of the pieces' normals, likewise.
+const SPREAD: [f64; 2] = [0.01, 0.1];
 /// Part of the least difference below which the derivatives of the tool's normals need not be found.
 const NEARLY: f64 = 0.9;
 
 /// A share, and its derivatives by the tool's position and rotation.
 type Share = (f64, [DVec3; 2]);
 
+/// Derivatives of sums over pieces.
+#[derive(Default)]
+struct EdgeSums {
+    /// Difference of the tool's normals and the pieces' own.
+    difference: DVec3,
+    difference_by: [DMat3; 2],
+    offset_by: [DVec3; 2],
+    walls_by: [DVec3; 2],
+}
+
 impl FootprintScratch {
     /// Mixes the tool's own normals into the sum of normals.
     pub(super) fn turn_to_tool(&mut self, tool: &PlacedShape<'_>, sums: &mut Sums) {
-        if self.rough_difference(tool.shape.thickness()) < NEARLY * apart()[0] * sums.weight {
-            return;
-        }
-        let (bulging, bulging_by) = sums.share_of_bulge(tool.shape.thickness());
-        if bulging == 0.0 {
+        let thickness = tool.shape.thickness();
+        if !sums.may_turn(thickness) {
             return;
         }
         self.near.find_tool_normals(tool);
-        let (mut difference, mut difference_by) = (DVec3::ZERO, [DMat3::ZERO; 2]);
-        for near in &self.near.pieces {
-            let Some((weight, by)) = near.weigh(self.near.margin) else { continue };
-            let (turned, turned_by) = near.turned(tool.shape.thickness());
-            difference += turned * weight;
-            for k in 0..2 {
-                difference_by[k] += outer(turned, by[k]) + turned_by[k] * weight;
-            }
-        }
-        let (size, inverse) = (difference.length(), 1.0 / sums.weight);
-        let (apart, apart_slope) = smooth_step(size * inverse, apart());
-        if apart == 0.0 {
-            return;
-        }
+        let edge = self.sum_over_edge(thickness);
+        let is_edge = either(sums.share_of_spread(), sums.share_of_difference(&edge));
+        let in_air = both(sums.share_of_bulge(&edge, thickness), sums.share_without_walls(&edge));
+        let (share, share_by) = both(is_edge, in_air);
         for k in 0..2 {
-            let size_by = difference_by[k].transpose() * difference * (1.0 / size);
-            let apart_by = (size_by - sums.weight_by[k] * (size * inverse)) * (apart_slope * inverse);
-            let share_by = apart_by * bulging + bulging_by[k] * apart;
-            sums.normal_by[k] += difference_by[k] * (apart * bulging) + outer(difference, share_by);
+            sums.normal_by[k] += edge.difference_by[k] * share + outer(edge.difference, share_by[k]);
         }
-        sums.normal += difference * (apart * bulging);
+        sums.normal += edge.difference * share;
     }
 
-    /// Length of the sum of weighted differences, as of the latest search.
-    fn rough_difference(&self, thickness: f64) -> f64 {
-        let weighed = |near: &NearPiece| {
-            let (weight, _) = near.weigh(self.near.margin)?;
-            let (share, _) = smooth_step(near.distance / thickness, OWN_NORMAL);
-            Some((near.tool_normal - near.normal) * (share * weight))
-        };
-        self.near.pieces.iter().filter_map(weighed).sum::<DVec3>().length()
+    fn sum_over_edge(&self, thickness: f64) -> EdgeSums {
+        let zero = [DMat3::ZERO; 2];
+        let mut edge = EdgeSums { difference_by: zero, ..EdgeSums::default() };
+        for near in &self.near.pieces {
+            let Some((whole, whole_by)) = near.weigh_whole(self.near.margin) else { continue };
+            let (weight, by) = (whole * near.contact_share, whole_by.map(|by| by * near.contact_share));
+            let (turned, turned_by) = near.turned(thickness);
+            let offset = (near.middle - self.near.centre).dot(near.normal);
+            edge.difference += turned * weight;
+            for k in 0..2 {
+                edge.difference_by[k] += outer(turned, by[k]) + turned_by[k] * weight;
+                edge.offset_by[k] += by[k] * offset;
+                edge.walls_by[k] += whole_by[k] - by[k];
+            }
+        }
+        edge
     }
 }
 
+/// Share of what has both.
+fn both((a, a_by): Share, (b, b_by): Share) -> Share {
+    (a * b, [0, 1].map(|k| a_by[k] * b + b_by[k] * a))
+}
+
+/// Share of what has either.
+fn either((a, a_by): Share, (b, b_by): Share) -> Share {
+    (a + b - a * b, [0, 1].map(|k| a_by[k] * (1.0 - b) + b_by[k] * (1.0 - a)))
+}
+
 impl NearPiece {
-    /// Difference of the tool's normal and the piece's own, and its derivatives; zero deep in the tool.
+    /// Difference of the tool's normal, as of the latest search, and the piece's own; zero deep in the tool.
+    pub(super) fn difference(&self, thickness: f64) -> DVec3 {
+        (self.tool_normal - self.normal) * smooth_step(self.distance / thickness, OWN_NORMAL).0
+    }
+
+    /// The difference and its derivatives, with the tool's normals found.
     fn turned(&self, thickness: f64) -> (DVec3, [DMat3; 2]) {
         let (share, rise) = smooth_step(self.distance / thickness, OWN_NORMAL);
         let difference = self.tool_normal - self.normal;
@@ -99,28 +112,74 @@ impl NearPiece {
 }
 
 impl Sums {
-    /// Share of the tool's normals, and its derivatives: with mean normal `n` and place `x`, the bulge `mean(n_i . x_i) - n . x` is
-    /// positive over an edge, and negative in a crease.
-    fn share_of_bulge(&self, thickness: f64) -> Share {
+    /// Whether the tool's normals can have a share. Planes, round bodies and creases end here.
+    fn may_turn(&self, thickness: f64) -> bool {
+        let spread = self.weight * self.weight * (1.0 - SPREAD[0]) - self.normal.length_squared();
+        let across =
+            self.difference.cross(self.normal).length() - NEARLY * APART[0] * self.weight * self.normal.length();
+        let walls = self.walls - WALLS[1] * (self.weight + self.walls);
+        (spread > 0.0 || across > 0.0) && walls < 0.0 && self.bulge() > BULGING[0] * thickness
+    }
+
+    /// `mean(n_i . x_i) - N . X`, m: positive over an edge, and negative in a crease.
+    fn bulge(&self) -> f64 {
+        let inverse = 1.0 / self.weight;
+        (self.offset - self.normal.dot(self.place) * inverse) * inverse
+    }
+
+    fn share_of_bulge(&self, edge: &EdgeSums, thickness: f64) -> Share {
         let inverse = 1.0 / self.weight;
         let (normal, place, offset) = (self.normal * inverse, self.place * inverse, self.offset * inverse);
-        let (bulging, bulge_slope) = smooth_step((offset - normal.dot(place)) / thickness, BULGING);
+        let (share, slope) = smooth_step(self.bulge() / thickness, BULGING);
         let by = [0, 1].map(|k| {
             let weight_by = self.weight_by[k];
             let normal_by = (self.normal_by[k] - outer(normal, weight_by)) * inverse;
             let place_by = (self.place_by[k] - outer(place, weight_by)) * inverse;
-            let offset_by = (self.offset_by[k] - weight_by * offset) * inverse;
-            let bulge_by = offset_by - normal_by.transpose() * place - place_by.transpose() * normal;
-            bulge_by * (bulge_slope / thickness)
+            let offset_by = (edge.offset_by[k] - weight_by * offset) * inverse;
+            (offset_by - normal_by.transpose() * place - place_by.transpose() * normal) * (slope / thickness)
         });
-        // Beside a wall the contact's pieces end as at an edge.
+        (share, by)
+    }
+
+    /// Beside a wall the contact's pieces end as at an edge.
+    fn share_without_walls(&self, edge: &EdgeSums) -> Share {
         let all = self.weight + self.walls;
-        let (hollow, slope) = smooth_step(self.walls / all, WALLS);
+        let (share, slope) = smooth_step(self.walls / all, WALLS);
         let by = [0, 1].map(|k| {
-            let walls_by = (self.walls_by[k] * self.weight - self.weight_by[k] * self.walls) / (all * all);
-            by[k] * (1.0 - hollow) - walls_by * (slope * bulging)
+            let walls_by = edge.walls_by[k] * self.weight - self.weight_by[k] * self.walls;
+            walls_by * (-slope / (all * all))
         });
-        (bulging * (1.0 - hollow), by)
+        (1.0 - share, by)
+    }
+
+    fn share_of_spread(&self) -> Share {
+        let inverse = 1.0 / self.weight;
+        let normal = self.normal * inverse;
+        let (share, slope) = smooth_step(1.0 - normal.length_squared(), SPREAD);
+        let by = [0, 1].map(|k| {
+            let normal_by = (self.normal_by[k] - outer(normal, self.weight_by[k])) * inverse;
+            normal_by.transpose() * normal * (-2.0 * slope)
+        });
+        (share, by)
+    }
+
+    /// With the unit normal `n`, of the part `d - (d . n) n` of the difference across it.
+    fn share_of_difference(&self, edge: &EdgeSums) -> Share {
+        let (inverse, length) = (1.0 / self.weight, self.normal.length());
+        let normal = self.normal * (1.0 / length.max(f64::MIN_POSITIVE));
+        let along = edge.difference.dot(normal);
+        let part = edge.difference - normal * along;
+        let size = part.length();
+        let (share, slope) = smooth_step(size * inverse, APART);
+        if slope == 0.0 {
+            return (share, [DVec3::ZERO; 2]);
+        }
+        let by = [0, 1].map(|k| {
+            // The part is across `n`: d|part| = part . (dd - (d . n) dn)/|part|.
+            let by = edge.difference_by[k] - self.normal_by[k] * (along / length);
+            (by.transpose() * part * (1.0 / size) - self.weight_by[k] * (size * inverse)) * (slope * inverse)
+        });
+        (share, by)
     }
 }
 

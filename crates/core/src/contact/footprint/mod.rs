@@ -129,10 +129,10 @@ struct Sums {
     normal_by: [DMat3; 2],
     /// Of places along their pieces' normals.
     offset: f64,
-    offset_by: [DVec3; 2],
     /// Weight of the walls beside them, which are no part of the contact.
     walls: f64,
-    walls_by: [DVec3; 2],
+    /// Difference of the tool's normals, as of the latest search, and the pieces' own.
+    difference: DVec3,
 }
 
 impl PressedSurface {
@@ -190,7 +190,7 @@ impl FootprintScratch {
         weights: &mut FanWeights,
     ) -> Option<Footprint> {
         self.flatten_walls(fine, known);
-        let mut sums = self.sum()?;
+        let mut sums = self.sum(tool.shape.thickness())?;
         self.turn_to_tool(tool, &mut sums);
         let MeanNormal { normal, by: normal_by } = sums.mean_normal(known.normal);
         let inverse = 1.0 / sums.weight;
@@ -226,7 +226,7 @@ impl FootprintScratch {
         }
     }
 
-    fn sum(&self) -> Option<Sums> {
+    fn sum(&self, thickness: f64) -> Option<Sums> {
         let mut sums = Sums {
             weight: 0.0,
             weight_by: [DVec3::ZERO; 2],
@@ -235,9 +235,8 @@ impl FootprintScratch {
             normal: DVec3::ZERO,
             normal_by: [DMat3::ZERO; 2],
             offset: 0.0,
-            offset_by: [DVec3::ZERO; 2],
             walls: 0.0,
-            walls_by: [DVec3::ZERO; 2],
+            difference: DVec3::ZERO,
         };
         for near in &self.near.pieces {
             let Some((whole, whole_by)) = near.weigh_whole(self.near.margin) else { continue };
@@ -247,14 +246,12 @@ impl FootprintScratch {
             sums.weight += weight;
             sums.place += place * weight;
             sums.normal += near.normal * weight;
-            let offset = place.dot(near.normal);
-            sums.offset += offset * weight;
+            sums.offset += place.dot(near.normal) * weight;
+            sums.difference += near.difference(thickness) * weight;
             for k in 0..2 {
-                sums.walls_by[k] += whole_by[k] - by[k];
                 sums.weight_by[k] += by[k];
                 sums.place_by[k] += outer(place, by[k]);
                 sums.normal_by[k] += outer(near.normal, by[k]);
-                sums.offset_by[k] += by[k] * offset;
             }
         }
         (sums.weight > 0.0).then_some(sums)
