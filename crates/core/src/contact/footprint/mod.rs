@@ -418,6 +418,20 @@ pub struct NearRelief<'a> {
     pub fine: &'a Tessellation,
 }
 
+impl NearRelief<'_> {
+    fn middle(&self, piece: u32) -> DVec3 {
+        let [a, b, c] = self.fine.corners(piece);
+        (a + b + c) / 3.0
+    }
+
+    /// Normal, of any length, of a piece as its wall is flattened: its slope is less by the wall's share.
+    fn flattened_normal(&self, piece: &NearPiece) -> DVec3 {
+        let Some((plane, others)) = &self.near.flattened_to else { return piece.normal };
+        let upright = plane.normal * piece.normal.dot(plane.normal);
+        upright + (piece.normal - upright) * (1.0 - piece.share_of_wall(plane, others, self.near.margin))
+    }
+}
+
 impl Relief for NearRelief<'_> {
     fn end(&self, plane: &ContactPlane, direction: DVec3, lowest: f64) -> Option<SurfaceEnd> {
         let facing = |near: &&NearPiece| near.normal.dot(plane.axes.z_axis) > 0.0;
@@ -440,7 +454,8 @@ impl Relief for NearRelief<'_> {
                     && faces(other_normal)
                 {
                     if near.piece < neighbour && is_crease {
-                        heights.smooth_edge(frame, edge, [near.normal, other_normal]);
+                        let other = NearPiece { normal: other_normal, middle: self.middle(neighbour), ..*near };
+                        heights.smooth_edge(frame, edge, [near, &other].map(|piece| self.flattened_normal(piece)));
                     }
                 } else if faces(near.normal) {
                     heights.add_edge(frame, edge, Some(near.normal));
