@@ -55,7 +55,7 @@ impl FootprintScratch {
         if !sums.may_turn(thickness) {
             return;
         }
-        self.near.find_tool_normals(tool);
+        self.near.find_turnings(tool);
         let edge = self.sum_over_edge(thickness);
         let is_edge = either(sums.share_of_spread(), sums.share_of_difference(&edge));
         let in_air = both(sums.share_of_bulge(&edge, thickness), sums.share_without_walls(&edge));
@@ -69,10 +69,10 @@ impl FootprintScratch {
     fn sum_over_edge(&self, thickness: f64) -> EdgeSums {
         let zero = [DMat3::ZERO; 2];
         let mut edge = EdgeSums { difference_by: zero, ..EdgeSums::default() };
-        for near in &self.near.pieces {
+        for (near, turning) in self.near.pieces.iter().zip(&self.near.turnings) {
             let Some((whole, whole_by)) = near.weigh_whole(self.near.margin) else { continue };
             let (weight, by) = (whole * near.contact_share, whole_by.map(|by| by * near.contact_share));
-            let (turned, turned_by) = near.turned(thickness);
+            let (turned, turned_by) = near.turned(turning, thickness);
             let offset = (near.middle - self.near.centre).dot(near.normal);
             edge.difference += turned * weight;
             for k in 0..2 {
@@ -101,12 +101,12 @@ impl NearPiece {
         (self.tool_normal - self.normal) * smooth_step(self.distance / thickness, OWN_NORMAL).0
     }
 
-    /// The difference and its derivatives, with the tool's normals found.
-    fn turned(&self, thickness: f64) -> (DVec3, [DMat3; 2]) {
+    /// The difference and its derivatives, with those of the tool's normal.
+    fn turned(&self, turning: &[DMat3; 2], thickness: f64) -> (DVec3, [DMat3; 2]) {
         let (share, rise) = smooth_step(self.distance / thickness, OWN_NORMAL);
         let difference = self.tool_normal - self.normal;
         let rise = rise / thickness;
-        let by = [0, 1].map(|k| self.tool_normal_by[k] * share + outer(difference, self.by_pose[k]) * rise);
+        let by = [0, 1].map(|k| turning[k] * share + outer(difference, self.by_pose[k]) * rise);
         (difference * share, by)
     }
 }

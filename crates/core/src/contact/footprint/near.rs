@@ -58,8 +58,6 @@ pub struct NearPiece {
     pub by_pose: [DVec3; 2],
     /// The tool's own normal, from the piece towards the tool, where it has been found.
     pub tool_normal: DVec3,
-    /// Its derivatives by the tool's position and rotation.
-    pub tool_normal_by: [DMat3; 2],
     /// Cosine between the normal and the direction to the tool's viewpoint.
     pub facing_cosine: f64,
     /// Its derivatives by the tool's position and rotation.
@@ -79,8 +77,8 @@ pub struct NearPieces {
     pub margin: f64,
     /// The plane to which walls have been flattened, beside which others.
     pub(super) flattened_to: Option<(Plane, OtherPlanes)>,
-    /// Whether the pieces have the tool's normals.
-    has_tool_normals: bool,
+    /// Derivatives of the tool's normals at the pieces by its position and rotation, where they have been found.
+    pub(super) turnings: Vec<[DMat3; 2]>,
     /// Key of the latest search, and the present position of the tool, m.
     key: Option<SearchKey>,
     position: DVec3,
@@ -106,7 +104,7 @@ impl Default for NearPieces {
             centre: DVec3::ZERO,
             margin: 0.0,
             flattened_to: None,
-            has_tool_normals: false,
+            turnings: Vec::with_capacity(MAX_PIECES),
             key: None,
             position: DVec3::ZERO,
         }
@@ -220,29 +218,34 @@ impl NearPieces {
     fn shift(&mut self, displacement: DVec3) {
         self.position += displacement;
         self.centre += displacement;
+        for (near, turning) in self.pieces.iter_mut().zip(&self.turnings) {
+            near.tool_normal += turning[0] * displacement;
+        }
         for near in self.pieces.iter_mut().chain(&mut self.opposite) {
             near.distance += near.by_pose[0].dot(displacement);
-            near.tool_normal += near.tool_normal_by[0] * displacement;
             near.facing_cosine += near.facing_cosine_by[0].dot(displacement);
         }
     }
 
-    /// Finds the tool's normals at the pieces that count, once after a search.
-    pub(super) fn find_tool_normals(&mut self, tool: &PlacedShape<'_>) {
-        if self.has_tool_normals {
+    /// Finds the tool's normals and their derivatives at the pieces that count, once after a search.
+    pub(super) fn find_turnings(&mut self, tool: &PlacedShape<'_>) {
+        if !self.turnings.is_empty() {
             return;
         }
-        self.has_tool_normals = true;
-        let (centre, margin) = (self.centre, self.margin);
-        for near in self.pieces.iter_mut().filter(|near| near.distance < margin + MOVED * tool.shape.thickness()) {
-            (near.tool_normal, near.tool_normal_by) = tool.normal(near.middle, centre);
+        let (centre, reach) = (self.centre, self.margin + MOVED * tool.shape.thickness());
+        for near in &mut self.pieces {
+            let mut turning = [DMat3::ZERO; 2];
+            if near.distance < reach {
+                (near.tool_normal, turning) = tool.normal(near.middle, centre);
+            }
+            self.turnings.push(turning);
         }
     }
 
     fn search(&mut self, pressed: &PressedSurface, query: &SurfaceQuery, tool: &PlacedShape<'_>) {
         let (fine, margin) = (&pressed.fine, pressed.margin);
         self.flattened_to = None;
-        self.has_tool_normals = false;
+        self.turnings.clear();
         self.pieces.clear();
         self.opposite.clear();
         (self.centre, self.margin) = (tool.centre(), margin);
@@ -304,7 +307,6 @@ fn near_piece(
         distance,
         by_pose,
         tool_normal,
-        tool_normal_by: [DMat3::ZERO; 2],
         facing_cosine,
         facing_cosine_by,
     }
