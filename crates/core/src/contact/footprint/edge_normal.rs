@@ -20,9 +20,12 @@ use glam::{DMat3, DVec3};
 use super::{FootprintScratch, NearPiece, PlacedShape, Sums, smooth_step};
 use crate::tensor::outer;
 
-/// Distances of a piece, over the tool's thickness, from which the tool's normal begins to count there, and counts alone: deep inside
-/// of a tool, beyond its middle surfaces, its normal jumps.
+/// Distances of a piece, over the tool's reach, from which the tool's normal begins to count there, and counts alone: deep inside
+/// of a tool, where two of its sides are as near, its normal jumps.
 const OWN_NORMAL: [f64; 2] = [-0.75, -0.25];
+/// Least reach of a tool, over its thickness: at a rim that is rounded less, as a punch's, the tool's own normal turns as fast as the
+/// body's does over an edge. Tools with less, and surfaces from files, leave the body's own normals.
+const LEAST_REACH: f64 = 0.5;
 /// Measure of a bulge, `mean(n_i . x_i) - N . X` over the tool's thickness, below which the pieces lie in a crease, and not at all.
 const BULGING: [f64; 2] = [-0.02, 0.0];
 /// Share of walls in what is near the tool from which the contact lies in a hollow, and fully so.
@@ -51,12 +54,12 @@ struct EdgeSums {
 impl FootprintScratch {
     /// Mixes the tool's own normals into the sum of normals.
     pub(super) fn turn_to_tool(&mut self, tool: &PlacedShape<'_>, sums: &mut Sums) {
-        let thickness = tool.shape.thickness();
-        if !sums.may_turn(thickness) {
+        let (thickness, reach) = (tool.shape.thickness(), tool.shape.reach());
+        if reach < LEAST_REACH * thickness || !sums.may_turn(thickness) {
             return;
         }
         self.near.find_turnings(tool);
-        let edge = self.sum_over_edge(thickness);
+        let edge = self.sum_over_edge(reach);
         let is_edge = either(sums.share_of_spread(), sums.share_of_difference(&edge));
         let in_air = both(sums.share_of_bulge(&edge, thickness), sums.share_without_walls(&edge));
         let (share, share_by) = both(is_edge, in_air);
@@ -66,13 +69,13 @@ impl FootprintScratch {
         sums.normal += edge.difference * share;
     }
 
-    fn sum_over_edge(&self, thickness: f64) -> EdgeSums {
+    fn sum_over_edge(&self, reach: f64) -> EdgeSums {
         let zero = [DMat3::ZERO; 2];
         let mut edge = EdgeSums { difference_by: zero, ..EdgeSums::default() };
         for (near, turning) in self.near.pieces.iter().zip(&self.near.turnings) {
             let Some((whole, whole_by)) = near.weigh_whole(self.near.margin) else { continue };
             let (weight, by) = (whole * near.contact_share, whole_by.map(|by| by * near.contact_share));
-            let (turned, turned_by) = near.turned(turning, thickness);
+            let (turned, turned_by) = near.turned(turning, reach);
             let offset = (near.middle - self.near.centre).dot(near.normal);
             edge.difference += turned * weight;
             for k in 0..2 {
@@ -97,15 +100,15 @@ fn either((a, a_by): Share, (b, b_by): Share) -> Share {
 
 impl NearPiece {
     /// Difference of the tool's normal, as of the latest search, and the piece's own; zero deep in the tool.
-    pub(super) fn difference(&self, thickness: f64) -> DVec3 {
-        (self.tool_normal - self.normal) * smooth_step(self.distance / thickness, OWN_NORMAL).0
+    pub(super) fn difference(&self, reach: f64) -> DVec3 {
+        (self.tool_normal - self.normal) * smooth_step(self.distance / reach, OWN_NORMAL).0
     }
 
     /// The difference and its derivatives, with those of the tool's normal.
-    fn turned(&self, turning: &[DMat3; 2], thickness: f64) -> (DVec3, [DMat3; 2]) {
-        let (share, rise) = smooth_step(self.distance / thickness, OWN_NORMAL);
+    fn turned(&self, turning: &[DMat3; 2], reach: f64) -> (DVec3, [DMat3; 2]) {
+        let (share, rise) = smooth_step(self.distance / reach, OWN_NORMAL);
         let difference = self.tool_normal - self.normal;
-        let rise = rise / thickness;
+        let rise = rise / reach;
         let by = [0, 1].map(|k| turning[k] * share + outer(difference, self.by_pose[k]) * rise);
         (difference * share, by)
     }
@@ -203,7 +206,7 @@ mod tests {
         let fields = vec![FanFields::default(); smooth.fans().len()];
         let shapes = [
             ToolShape::ellipsoid(DVec3::new(0.2, 0.15, 0.1)).expect("a shape"),
-            ToolShape::punch(0.1, 0.03).expect("a shape"),
+            ToolShape::punch(0.1, 0.08).expect("a shape"),
             ToolShape::capsule(0.1, 0.1).expect("a shape"),
         ];
         for shape in &shapes {

@@ -190,7 +190,7 @@ impl FootprintScratch {
         weights: &mut FanWeights,
     ) -> Option<Footprint> {
         self.flatten_walls(fine, known);
-        let mut sums = self.sum(tool.shape.thickness())?;
+        let mut sums = self.sum(tool.shape.reach())?;
         self.turn_to_tool(tool, &mut sums);
         let MeanNormal { normal, by: normal_by } = sums.mean_normal(known.normal);
         let inverse = 1.0 / sums.weight;
@@ -226,7 +226,7 @@ impl FootprintScratch {
         }
     }
 
-    fn sum(&self, thickness: f64) -> Option<Sums> {
+    fn sum(&self, reach: f64) -> Option<Sums> {
         let mut sums = Sums {
             weight: 0.0,
             weight_by: [DVec3::ZERO; 2],
@@ -247,7 +247,7 @@ impl FootprintScratch {
             sums.place += place * weight;
             sums.normal += near.normal * weight;
             sums.offset += place.dot(near.normal) * weight;
-            sums.difference += near.difference(thickness) * weight;
+            sums.difference += near.difference(reach) * weight;
             for k in 0..2 {
                 sums.weight_by[k] += by[k];
                 sums.place_by[k] += outer(place, by[k]);

@@ -193,6 +193,17 @@ impl ToolShape {
         }
     }
 
+    /// Depth below its surface to which all points have one closest point, m: its least radius of curvature. That of a surface from a
+    /// file is not known, and zero.
+    pub fn reach(&self) -> f64 {
+        match *self {
+            Self::Sphere { radius } | Self::Capsule { radius, .. } => radius,
+            Self::Ellipsoid { semi_axes } => semi_axes.min_element().powi(2) / semi_axes.max_element(),
+            Self::Punch { rounding, .. } => rounding,
+            Self::Surface(_) => 0.0,
+        }
+    }
+
     /// Half its width where it is narrowest, m.
     pub fn thickness(&self) -> f64 {
         match *self {

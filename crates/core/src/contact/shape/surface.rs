@@ -12,7 +12,6 @@ use parry3d_f64::shape::{TriMesh, TriMeshFlags};
 
 use super::LineEntry;
 use crate::math::sincos;
-use crate::tensor::across;
 use crate::{Error, Result};
 
 /// Grid cells along the longest side of the surface.
@@ -27,8 +26,6 @@ const SUPPORT_DIRECTIONS: usize = 256;
 const OVERSHOOT: f64 = 0.05;
 /// Steps along a line until it enters; a line that grazes the surface for longer is taken as passing by.
 const MAX_LINE_STEPS: usize = 32;
-/// Way over which the second derivatives of the splines are found, in grid cells.
-const TURNING_STEP: f64 = 1e-3;
 /// Newton's step along a line, over the size of the surface, that is the last one.
 const LAST_STEP: f64 = 1e-6;
 /// Fewest triangles that close a surface.
@@ -102,24 +99,6 @@ impl SurfaceShape {
             Some(direction) => (value + beyond.length(), direction),
             None => (value, gradient.try_normalize().unwrap_or(DVec3::NEG_Z)),
         }
-    }
-
-    /// The gradient and its derivative, from the second derivatives of the spline; beyond the grid it turns around the grid.
-    pub(super) fn turning_gradient(&self, point: DVec3) -> (DVec3, DMat3) {
-        let (_, gradient) = self.signed_distance(point);
-        let far = self.corner + self.spacing * DVec3::from_array(self.nodes.map(|n| (n - 1) as f64));
-        let beyond = point - point.clamp(self.corner, far);
-        if beyond != DVec3::ZERO {
-            let outside = DVec3::select(beyond.cmpeq(DVec3::ZERO), DVec3::ZERO, DVec3::ONE);
-            return (gradient, across(gradient) * DMat3::from_diagonal(outside) * (1.0 / beyond.length()));
-        }
-        // The slope is linear within a cell along each axis, and nearly so over so short a way.
-        let step = TURNING_STEP * self.spacing;
-        let slope = |at: DVec3| self.interpolate(at.clamp(self.corner, far)).1;
-        let [x, y, z] =
-            DVec3::AXES.map(|axis| (slope(point + step * axis) - slope(point - step * axis)) / (2.0 * step));
-        let length = self.interpolate(point).1.length().max(f64::MIN_POSITIVE);
-        (gradient, across(gradient) * DMat3::from_cols(x, y, z) * (1.0 / length))
     }
 
     /// Value and gradient of the spline at a point of the grid.

@@ -12,7 +12,7 @@ use crate::tensor::{across, outer};
 const LEAST_RADIUS: f64 = 1e-3;
 
 impl ToolShape {
-    /// Gradient of the signed distance at a point, and its derivative by the point, 1/m.
+    /// Gradient of the signed distance at a point, and its derivative by the point, 1/m; zero for a surface from a file.
     pub fn turning_gradient(&self, point: DVec3) -> (DVec3, DMat3) {
         let least = LEAST_RADIUS * self.thickness();
         match *self {
@@ -25,7 +25,7 @@ impl ToolShape {
                 (gradient, turning - along * (1.0 / (point - DVec3::Z * nearest).length().max(least)))
             }
             Self::Punch { radius, rounding } => around_punch((radius, rounding), point, least),
-            Self::Surface(ref surface) => surface.turning_gradient(point),
+            Self::Surface(ref surface) => (surface.signed_distance(point).1, DMat3::ZERO),
         }
     }
 }
