@@ -7,6 +7,11 @@ pub fn outer(a: DVec3, b: DVec3) -> DMat3 {
     DMat3::from_cols(a * b.x, a * b.y, a * b.z)
 }
 
+/// The matrix of `a x`.
+pub fn skew(a: DVec3) -> DMat3 {
+    DMat3::from_cols(a.cross(DVec3::X), a.cross(DVec3::Y), a.cross(DVec3::Z))
+}
+
 /// Projection on the plane across a unit normal, `I - n n^T`.
 pub fn across(normal: DVec3) -> DMat3 {
     DMat3::IDENTITY - outer(normal, normal)

@@ -6,7 +6,8 @@
 //! w_i = A_i (1 - s_i/m)^2 eta(n_i . d_i)      x = sum w_i x_i / sum w_i        n = sum w_i n_i / |sum w_i n_i|
 //! ```
 //!
-//! for `s_i < m`. The contact's middle `x` and normal `n` are means over them, and so are all fields known at the nodes. The factor
+//! for `s_i < m`. The contact's middle `x` and normal `n` are means over them, and so are all fields known at the nodes. Over a sharp
+//! edge `n_i` is the tool's own normal instead (`edge_normal`), for the mean of the sides' turns over between them. The factor
 //! `eta` excludes pieces that face away from the tool's middle, in the direction `d_i`, as the other side of a plate does. The
 //! plane of the contact is raised over `x` to the highest piece that the tool may touch. All this is a function of the tool's pose
 //! alone with exact derivatives, as long as the tool's middle has not sunk in; from then on the middle is taken as lifted along the
@@ -16,6 +17,7 @@
 //! tick is therefore flattened to that plane, completely if it is steeper than 78 degrees and not at all up to 45. It is pressed by
 //! an additional contact of the same tool, on a plane of its own. A piece belongs to the plane that it is most parallel to.
 
+mod edge_normal;
 mod near;
 
 use glam::{DMat3, DVec3};
@@ -125,6 +127,12 @@ struct Sums {
     place_by: [DMat3; 2],
     normal: DVec3,
     normal_by: [DMat3; 2],
+    /// Of places along their pieces' normals.
+    offset: f64,
+    /// Weight of the walls beside them, which are no part of the contact.
+    walls: f64,
+    /// Difference of the tool's normals, as of the latest search, and the pieces' own.
+    difference: DVec3,
 }
 
 impl PressedSurface {
@@ -176,13 +184,14 @@ impl FootprintScratch {
     /// The footprint of a tool whose near pieces are known, and the weights of the fans below it. `None` if no piece is near.
     pub fn find(
         &mut self,
-        fine: &Tessellation,
-        smooth: &SmoothSurface,
+        tool: &PlacedShape<'_>,
+        (fine, smooth): (&Tessellation, &SmoothSurface),
         known: Plane,
         weights: &mut FanWeights,
     ) -> Option<Footprint> {
         self.flatten_walls(fine, known);
-        let sums = self.sum()?;
+        let mut sums = self.sum(tool.shape.reach())?;
+        self.turn_to_tool(tool, &mut sums);
         let MeanNormal { normal, by: normal_by } = sums.mean_normal(known.normal);
         let inverse = 1.0 / sums.weight;
         let middle = sums.place * inverse;
@@ -217,7 +226,7 @@ impl FootprintScratch {
         }
     }
 
-    fn sum(&self) -> Option<Sums> {
+    fn sum(&self, reach: f64) -> Option<Sums> {
         let mut sums = Sums {
             weight: 0.0,
             weight_by: [DVec3::ZERO; 2],
@@ -225,13 +234,20 @@ impl FootprintScratch {
             place_by: [DMat3::ZERO; 2],
             normal: DVec3::ZERO,
             normal_by: [DMat3::ZERO; 2],
+            offset: 0.0,
+            walls: 0.0,
+            difference: DVec3::ZERO,
         };
         for near in &self.near.pieces {
-            let Some((weight, by)) = near.weigh(self.near.margin) else { continue };
+            let Some((whole, whole_by)) = near.weigh_whole(self.near.margin) else { continue };
+            let (weight, by) = (whole * near.contact_share, whole_by.map(|by| by * near.contact_share));
             let place = near.middle - self.near.centre;
+            sums.walls += whole - weight;
             sums.weight += weight;
             sums.place += place * weight;
             sums.normal += near.normal * weight;
+            sums.offset += place.dot(near.normal) * weight;
+            sums.difference += near.difference(reach) * weight;
             for k in 0..2 {
                 sums.weight_by[k] += by[k];
                 sums.place_by[k] += outer(place, by[k]);
@@ -298,17 +314,22 @@ impl FootprintScratch {
 }
 
 impl NearPiece {
-    /// Weight of a piece, and its derivatives by the tool's position and rotation; `None` for zero.
+    /// Weight of a piece in the contact, and its derivatives by the tool's position and rotation; `None` for zero.
     fn weigh(&self, margin: f64) -> Option<(f64, [DVec3; 2])> {
+        let (whole, by) = self.weigh_whole(margin)?;
+        Some((whole * self.contact_share, by.map(|by| by * self.contact_share)))
+    }
+
+    /// Weight of a piece, whether it belongs to the contact or to a wall, and its derivatives.
+    fn weigh_whole(&self, margin: f64) -> Option<(f64, [DVec3; 2])> {
         let nearness = 1.0 - self.distance / margin;
         let (eta, rise) = smooth_step(self.facing_cosine, FACING);
         if nearness <= 0.0 || eta <= 0.0 {
             return None;
         }
         let (by_distance, by_facing) = (-2.0 * nearness * eta / margin, nearness * nearness * rise);
-        let area = self.area * self.contact_share;
-        let by = [0, 1].map(|k| (self.by_pose[k] * by_distance + self.facing_cosine_by[k] * by_facing) * area);
-        Some((area * nearness * nearness * eta, by))
+        let by = [0, 1].map(|k| (self.by_pose[k] * by_distance + self.facing_cosine_by[k] * by_facing) * self.area);
+        Some((self.area * nearness * nearness * eta, by))
     }
 
     /// Share to which the piece is a wall rising over a plane: one if it is steep, or more parallel to one of the `others`, and the
@@ -397,6 +418,20 @@ pub struct NearRelief<'a> {
     pub fine: &'a Tessellation,
 }
 
+impl NearRelief<'_> {
+    fn middle(&self, piece: u32) -> DVec3 {
+        let [a, b, c] = self.fine.corners(piece);
+        (a + b + c) / 3.0
+    }
+
+    /// Normal, of any length, of a piece as its wall is flattened: its slope is less by the wall's share.
+    fn flattened_normal(&self, piece: &NearPiece) -> DVec3 {
+        let Some((plane, others)) = &self.near.flattened_to else { return piece.normal };
+        let upright = plane.normal * piece.normal.dot(plane.normal);
+        upright + (piece.normal - upright) * (1.0 - piece.share_of_wall(plane, others, self.near.margin))
+    }
+}
+
 impl Relief for NearRelief<'_> {
     fn end(&self, plane: &ContactPlane, direction: DVec3, lowest: f64) -> Option<SurfaceEnd> {
         let facing = |near: &&NearPiece| near.normal.dot(plane.axes.z_axis) > 0.0;
@@ -419,7 +454,8 @@ impl Relief for NearRelief<'_> {
                     && faces(other_normal)
                 {
                     if near.piece < neighbour && is_crease {
-                        heights.smooth_edge(frame, edge, [near.normal, other_normal]);
+                        let other = NearPiece { normal: other_normal, middle: self.middle(neighbour), ..*near };
+                        heights.smooth_edge(frame, edge, [near, &other].map(|piece| self.flattened_normal(piece)));
                     }
                 } else if faces(near.normal) {
                     heights.add_edge(frame, edge, Some(near.normal));

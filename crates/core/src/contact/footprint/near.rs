@@ -5,6 +5,7 @@ use glam::{DMat3, DVec3};
 use super::{OtherPlanes, Plane, PressedSurface};
 use crate::contact::shape::ToolShape;
 use crate::contact::{SurfaceQuery, Tessellation};
+use crate::tensor::{across, outer, skew};
 
 /// Motion of a tool, over its thickness, below which the near pieces stay the same.
 const MOVED: f64 = 1e-3;
@@ -55,6 +56,8 @@ pub struct NearPiece {
     pub distance: f64,
     /// Its derivatives by the tool's position, and by its rotation about its origin, m.
     pub by_pose: [DVec3; 2],
+    /// The tool's own normal, from the piece towards the tool, where it has been found.
+    pub tool_normal: DVec3,
     /// Cosine between the normal and the direction to the tool's viewpoint.
     pub facing_cosine: f64,
     /// Its derivatives by the tool's position and rotation.
@@ -74,6 +77,8 @@ pub struct NearPieces {
     pub margin: f64,
     /// The plane to which walls have been flattened, beside which others.
     pub(super) flattened_to: Option<(Plane, OtherPlanes)>,
+    /// Derivatives of the tool's normals at the pieces by its position and rotation, where they have been found.
+    pub(super) turnings: Vec<[DMat3; 2]>,
     /// Key of the latest search, and the present position of the tool, m.
     key: Option<SearchKey>,
     position: DVec3,
@@ -99,6 +104,7 @@ impl Default for NearPieces {
             centre: DVec3::ZERO,
             margin: 0.0,
             flattened_to: None,
+            turnings: Vec::with_capacity(MAX_PIECES),
             key: None,
             position: DVec3::ZERO,
         }
@@ -140,7 +146,8 @@ impl PlacedShape<'_> {
     }
 
     /// Distance of a point from the tool, and its derivatives by position and rotation.
-    fn distance(&self, point: DVec3, centre: DVec3, headroom: f64) -> (f64, [DVec3; 2]) {
+    /// The tool's normal there, from the point towards the tool, comes third.
+    fn distance(&self, point: DVec3, centre: DVec3, headroom: f64) -> (f64, [DVec3; 2], DVec3) {
         let arm = centre - self.position;
         let above = (point - centre).dot(self.contact_normal).max(0.0);
         let at = point - self.contact_normal * above;
@@ -149,13 +156,33 @@ impl PlacedShape<'_> {
         let mut by_pose = [-gradient, gradient.cross(at - self.position)];
         // The height of the middle moves with the tool.
         let mut rise = if above > 0.0 { gradient.dot(self.contact_normal) } else { 0.0 };
+        let normal = self.contact_normal * rise - gradient;
         if above > headroom {
             distance += HEADROOM_SLOPE * (above - headroom);
             rise -= HEADROOM_SLOPE;
         }
         by_pose[0] += self.contact_normal * rise;
         by_pose[1] += arm.cross(self.contact_normal) * rise;
-        (distance, by_pose)
+        (distance, by_pose, normal)
+    }
+
+    /// The tool's normal at a point, and its derivatives by position and rotation.
+    ///
+    /// With the gradient `g` of the distance, which turns by `H`, and the projection `P` across the contact's normal above the
+    /// tool's middle, the normal is `-P g`.
+    fn normal(&self, point: DVec3, centre: DVec3) -> (DVec3, [DMat3; 2]) {
+        let normal = self.contact_normal;
+        let above = (point - centre).dot(normal);
+        let at = point - normal * above.max(0.0) - self.position;
+        let (gradient, turning) = self.shape.turning_gradient(self.rotation.transpose() * at);
+        let turning = self.rotation * turning * self.rotation.transpose();
+        let gradient = self.rotation * gradient;
+        if above <= 0.0 {
+            return (-gradient, [turning, skew(gradient) - turning * skew(at)]);
+        }
+        let level = across(normal);
+        let lifted = outer(normal, (centre - self.position).cross(normal)) + skew(at);
+        (-(level * gradient), [level * turning * level, level * (skew(gradient) - turning * lifted)])
     }
 }
 
@@ -191,15 +218,34 @@ impl NearPieces {
     fn shift(&mut self, displacement: DVec3) {
         self.position += displacement;
         self.centre += displacement;
+        for (near, turning) in self.pieces.iter_mut().zip(&self.turnings) {
+            near.tool_normal += turning[0] * displacement;
+        }
         for near in self.pieces.iter_mut().chain(&mut self.opposite) {
             near.distance += near.by_pose[0].dot(displacement);
             near.facing_cosine += near.facing_cosine_by[0].dot(displacement);
         }
     }
 
+    /// Finds the tool's normals and their derivatives at the pieces that count, once after a search.
+    pub(super) fn find_turnings(&mut self, tool: &PlacedShape<'_>) {
+        if !self.turnings.is_empty() {
+            return;
+        }
+        let (centre, reach) = (self.centre, self.margin + MOVED * tool.shape.thickness());
+        for near in &mut self.pieces {
+            let mut turning = [DMat3::ZERO; 2];
+            if near.distance < reach {
+                (near.tool_normal, turning) = tool.normal(near.middle, centre);
+            }
+            self.turnings.push(turning);
+        }
+    }
+
     fn search(&mut self, pressed: &PressedSurface, query: &SurfaceQuery, tool: &PlacedShape<'_>) {
         let (fine, margin) = (&pressed.fine, pressed.margin);
         self.flattened_to = None;
+        self.turnings.clear();
         self.pieces.clear();
         self.opposite.clear();
         (self.centre, self.margin) = (tool.centre(), margin);
@@ -247,7 +293,7 @@ fn near_piece(
     let middle = (a + b + c) / 3.0;
     let across = (b - a).cross(c - a);
     let size = corners.iter().map(|corner| corner.distance_squared(middle)).fold(0.0, f64::max).sqrt();
-    let (distance, by_pose) = tool.distance(middle, centre, headroom);
+    let (distance, by_pose, tool_normal) = tool.distance(middle, centre, headroom);
     let (normal, area) = (across.normalize_or_zero(), 0.5 * across.length());
     let (facing_cosine, facing_cosine_by) = tool.cosine_to_viewpoint((middle, normal), viewpoint);
     NearPiece {
@@ -260,6 +306,7 @@ fn near_piece(
         contact_share: 1.0,
         distance,
         by_pose,
+        tool_normal,
         facing_cosine,
         facing_cosine_by,
     }

@@ -7,12 +7,14 @@ mod capsule;
 pub(crate) mod ellipsoid;
 mod punch;
 mod surface;
+mod turning;
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 pub use surface::SurfaceShape;
 
 use crate::math::hypot;
+use crate::tensor::outer;
 use crate::{Error, Result};
 
 /// Shape of a tool.
@@ -191,6 +193,17 @@ impl ToolShape {
         }
     }
 
+    /// Depth below its surface to which all points have one closest point, m: its least radius of curvature. That of a surface from a
+    /// file is not known, and zero.
+    pub fn reach(&self) -> f64 {
+        match *self {
+            Self::Sphere { radius } | Self::Capsule { radius, .. } => radius,
+            Self::Ellipsoid { semi_axes } => semi_axes.min_element().powi(2) / semi_axes.max_element(),
+            Self::Punch { rounding, .. } => rounding,
+            Self::Surface(_) => 0.0,
+        }
+    }
+
     /// Half its width where it is narrowest, m.
     pub fn thickness(&self) -> f64 {
         match *self {
@@ -203,14 +216,20 @@ impl ToolShape {
         }
     }
 
-    /// The direction along which the shape is longest, a unit vector: contacts are mostly longest along it too.
-    pub fn long_axis(&self) -> DVec3 {
+    /// A symmetric matrix, largest along the direction in which the shape is longest, and one there. Seen along any direction the
+    /// shape is longest along the axis of the matrix across it, and so are most contacts.
+    pub fn extents(&self) -> DMat3 {
+        let along = |axis: DVec3| outer(axis, axis);
         match *self {
-            Self::Sphere { .. } | Self::Capsule { .. } => DVec3::Z,
+            Self::Sphere { .. } | Self::Capsule { .. } => along(DVec3::Z),
             // Its face is round, so the axis that lies in the face serves as well as any.
-            Self::Punch { .. } => DVec3::X,
-            Self::Ellipsoid { semi_axes } => DVec3::AXES[semi_axes.max_position()],
-            Self::Surface(ref surface) => surface.long_axis(),
+            Self::Punch { .. } => along(DVec3::X),
+            // That of its shadow.
+            Self::Ellipsoid { semi_axes } => {
+                let parts = semi_axes / semi_axes.max_element();
+                DMat3::from_diagonal(parts * parts)
+            }
+            Self::Surface(ref surface) => along(surface.long_axis()),
         }
     }
 }

@@ -214,3 +214,22 @@ fn sizes_that_are_none_are_refused() {
     }
     assert!(ToolShape::punch(1.0, 1.5).unwrap_err().to_string().contains("more than its radius"));
 }
+
+#[test]
+fn the_gradient_turns_as_its_differences_do() {
+    for shape in shapes() {
+        let size = shape.thickness();
+        for (k, direction) in directions(60).enumerate() {
+            let on = shape.support(direction);
+            let point = on + direction * size * (0.01 * k as f64 - 0.15);
+            let (gradient, turning) = shape.turning_gradient(point);
+            assert_eq!(gradient, shape.signed_distance(point).1);
+            let h = 1e-5 * size;
+            for axis in DVec3::AXES {
+                let [ahead, behind] = [h, -h].map(|h| shape.signed_distance(point + h * axis).1);
+                let error = ((ahead - behind) / (2.0 * h) - turning * axis).length();
+                assert!(error < 1e-3 * turning.x_axis.length().max(1.0 / size), "{error:e} {shape:?} {point}");
+            }
+        }
+    }
+}

@@ -1,6 +1,6 @@
 //! Rectangle of the cells on the tangent plane: the smallest that contains the part of the tool below that plane.
 //!
-//! The rectangle moves with the tool, turns with its long axis and grows with its depth, so that cells are as fine as the
+//! The rectangle moves with the tool, turns with its longest axis in the plane and grows with its depth, so that cells are as fine as the
 //! contact allows, and a tool that slides over a plane meets the same cells everywhere. Its motion is part of the
 //! energy's gradient. Its sides are found by duality: for a convex body with the support function `h`, the largest
 //! coordinate along `e` of its points below the plane is `min h(e - mu n)` over `mu >= 0`, least where the support lies in
@@ -10,12 +10,14 @@
 use glam::{DMat3, DVec3};
 
 use super::super::super::shape::ToolShape;
+use crate::math::hypot;
 
 /// Most steps towards the direction of a side's support.
 const MAX_SUPPORT_STEPS: usize = 50;
 /// Height of a straight arc of the tool over its chord, over the tool's size: such an arc is 3e-7 long.
 const STRAIGHT: f64 = 1e-14;
-/// Least sine of the angle between a tool's long axis and the normal for the grid to follow that axis.
+/// Least sine of the angle between a tool's long axis and the normal for the grid to follow that axis; the square is the least
+/// difference of its extents along the grid's axes.
 const LEAST_SINE: f64 = 1e-3;
 
 /// A side of the rectangle.
@@ -62,19 +64,27 @@ impl ToolInSurfaceFrame<'_> {
 
     /// The rectangle around the part of the tool below the plane, which must not be empty.
     pub fn rectangle(&self) -> Rectangle {
-        let long = self.rotation * self.shape.long_axis();
-        let flat = long.with_z(0.0);
-        let squared_sine = flat.length_squared();
-        let (first, angle_by_rotation) = match squared_sine > LEAST_SINE * LEAST_SINE {
-            true => (flat / squared_sine.sqrt(), long.cross(DVec3::Z.cross(flat)) / squared_sine),
-            false => (DVec3::X, DVec3::ZERO),
-        };
-        let axes = [first, DVec3::Z.cross(first)];
+        let (axes, angle_by_rotation) = self.axes();
         let sides = axes.map(|axis| {
             let (lower, upper) = (self.side(-axis), self.side(axis));
             [lower.reversed(), upper]
         });
         Rectangle { axes, sides, angle_by_rotation }
+    }
+
+    /// Axes of the grid in the plane, those of the shape's extents across the normal, and the change of their angle with a rotation
+    /// of the tool. With the extents `E`, whose parts along both axes differ by `d`, it is `(E e_2 x e_1 + E e_1 x e_2)/d`.
+    fn axes(&self) -> ([DVec3; 2], DVec3) {
+        let extents = self.rotation * self.shape.extents() * self.rotation.transpose();
+        let (difference, mixed) = (extents.x_axis.x - extents.y_axis.y, 2.0 * extents.x_axis.y);
+        let spread = hypot(difference, mixed);
+        if spread <= LEAST_SINE * LEAST_SINE {
+            return ([DVec3::X, DVec3::Y], DVec3::ZERO);
+        }
+        let (sin, cos) = half_angle(difference / spread, mixed / spread);
+        let (first, second) = (DVec3::new(cos, sin, 0.0), DVec3::new(-sin, cos, 0.0));
+        let turning = (extents * second).cross(first) + (extents * first).cross(second);
+        ([first, second], turning / spread)
     }
 
     /// The upper side along a direction in the plane.
@@ -145,4 +155,14 @@ impl RectangleSide {
     fn reversed(self) -> Self {
         Self { coordinate: -self.coordinate, gradient: -self.gradient, by_surface: -self.by_surface, ..self }
     }
+}
+
+/// Sine and cosine, the latter not negative, of half of an angle.
+fn half_angle(cos: f64, sin: f64) -> (f64, f64) {
+    if cos >= 0.0 {
+        let half = (0.5 * (1.0 + cos)).sqrt();
+        return (0.5 * sin / half, half);
+    }
+    let half = (0.5 * (1.0 - cos)).sqrt();
+    (half.copysign(sin), 0.5 * sin.abs() / half)
 }

@@ -126,7 +126,7 @@ pub fn find_wall_contact(model: &Model, state: &mut State, memory: TickMemory<'_
         PlacedShape { position: local.relative_position, contact_normal: plane.normal, penetration: 0.0, ..contact };
     footprint.near.find(pressed_surface, &model.bodies[body].query, &at);
     let weights = &mut memory.weight_scratch.weights;
-    let Some(wall) = footprint.find(&pressed_surface.fine, &own.smooth, plane, weights) else {
+    let Some(wall) = footprint.find(&at, (&pressed_surface.fine, &own.smooth), plane, weights) else {
         return;
     };
     if weights.is_outside() {

@@ -163,7 +163,7 @@ fn starting_footprint(
     let at =
         PlacedShape { position: place, penetration: displacement.length(), contact_normal: first_plane.normal, ..at };
     footprint.near.find(pressed, drawn.query, &at);
-    let contact_footprint = footprint.find(&pressed.fine, &local.smooth, first_plane, weights)?;
+    let contact_footprint = footprint.find(&at, (&pressed.fine, &local.smooth), first_plane, weights)?;
     let faces = |near: &&NearPiece| near.normal.dot(contact_footprint.normal) > 0.0;
     let deepest = footprint.near.pieces.iter().filter(faces).map(|near| -near.distance).fold(0.0, f64::max);
     Some((contact_footprint.foot(place), deepest))

@@ -182,7 +182,7 @@ fn evaluate_shape(
     let Guess { place, force, .. } = guess;
     let shape = placed_shape(tool.shape, contact, place);
     cells.footprint.near.find(pressed, body.drawn.query, &shape);
-    let footprint = cells.footprint.find(&pressed.fine, body.smooth, contact.plane(), weights);
+    let footprint = cells.footprint.find(&shape, (&pressed.fine, body.smooth), contact.plane(), weights);
     let Some(footprint) = footprint else {
         // The tool is away from the body: no force.
         let compliance = DMat3::ZERO;

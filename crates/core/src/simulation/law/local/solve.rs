@@ -270,7 +270,7 @@ fn follow_motion(
                 local.footprint.others = other_planes(contacts, slot);
                 let near = &mut local.footprint.near;
                 near.find(pressed, &fixed.query, &at);
-                if local.footprint.find(&pressed.fine, &own.smooth, contact.plane(), weights).is_none() {
+                if local.footprint.find(&at, (&pressed.fine, &own.smooth), contact.plane(), weights).is_none() {
                     own.smooth.weigh(foot, weights);
                 }
             }
