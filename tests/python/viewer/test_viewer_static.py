@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import inspect
 from types import SimpleNamespace
 
@@ -42,20 +43,32 @@ OTHERS = [
 ]
 
 
+@contextlib.contextmanager
+def served_site(scenes: dict[str, palpate.Scene], cache, folder):
+    """Address of a static page of the scenes, from a plain file server."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(cache))
+        write_site([(name, scene.build(progress=False)) for name, scene in scenes.items()], folder, gallery=False)
+    with served(folder) as address:
+        yield address
+
+
 @pytest.fixture(scope="module")
 def site(cache, tmp_path_factory):
-    """The paper's liver, as in the demo, and other scenes, from a plain file server."""
+    """The paper's liver, as in the demo."""
+    scenes = {"liver": model_scene("liver", paper=True)}
+    with served_site(scenes, cache, tmp_path_factory.mktemp("static") / "site") as address:
+        yield address
+
+
+@pytest.fixture(scope="module")
+def site_of_others(cache, tmp_path_factory):
     files = tmp_path_factory.mktemp("scenes")
     scenes = {
-        "liver": model_scene("liver", paper=True),
         "thin": palpate.Scene.read(thin.scene_file(files)),
         "pair": palpate.Scene(body=two_tools.TWO_LIVERS, tool=[{}, {}]),
     }
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(cache))
-        folder = tmp_path_factory.mktemp("static") / "site"
-        write_site([(name, scene.build(progress=False)) for name, scene in scenes.items()], folder, gallery=False)
-    with served(folder) as address:
+    with served_site(scenes, cache, tmp_path_factory.mktemp("static") / "site") as address:
         yield address
 
 
@@ -83,8 +96,8 @@ def test_of_the_page_that_takes_long(page, test):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("test", "scene"), OTHERS, ids=lambda value: getattr(value, "__name__", value))
-def test_of_the_page_of_another_scene(chromium, site, test, scene):
-    program = SimpleNamespace(address=f"{site}/index.html?scene={scene}")
+def test_of_the_page_of_another_scene(chromium, site_of_others, test, scene):
+    program = SimpleNamespace(address=f"{site_of_others}/index.html?scene={scene}")
     if "size" in inspect.signature(test).parameters:
         test(chromium, program, (1280, 720))
     else:
