@@ -11,7 +11,7 @@ import palpate
 from palpate.mesh import TetMesh
 
 # Standard error of the process itself, whatever captures that of a test.
-STDERR = os.fdopen(os.dup(2), "w")
+STDERR = pytest.StashKey()
 
 
 def pytest_addoption(parser):
@@ -19,6 +19,11 @@ def pytest_addoption(parser):
         "--no-skips", action="store_true", help="a skipped test is a failure, as on a machine with all tools"
     )
     parser.addoption("--whole", action="store_true", help="campaigns with all of their cases, for about an hour")
+
+
+def pytest_configure(config):
+    """Nothing is captured now; while this file was imported, it was."""
+    config.stash[STDERR] = os.dup(2)
 
 
 @pytest.hookimpl(hookwrapper=True)
@@ -41,7 +46,7 @@ def pytest_runtest_protocol(item):
     """
     marker = item.get_closest_marker("timeout")
     limit = float(marker.args[0] if marker and marker.args else item.config.getini("timeout"))
-    faulthandler.dump_traceback_later(limit + 60, exit=True, file=STDERR)
+    faulthandler.dump_traceback_later(limit + 60, exit=True, file=item.config.stash[STDERR])
     try:
         return (yield)
     finally:
