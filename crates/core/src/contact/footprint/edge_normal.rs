@@ -18,6 +18,7 @@
 use glam::{DMat3, DVec3};
 
 use super::{FootprintScratch, NearPiece, PlacedShape, Sums, smooth_step};
+use crate::contact::shape::ToolShape;
 use crate::tensor::outer;
 
 /// Distances of a piece, over the tool's reach, from which the tool's normal begins to count there, and counts alone: deep inside
@@ -41,7 +42,7 @@ const NEARLY: f64 = 0.9;
 /// A share, and its derivatives by the tool's position and rotation.
 type Share = (f64, [DVec3; 2]);
 
-/// Derivatives of sums over pieces.
+/// Sums over pieces, and derivatives of sums, that only an edge needs.
 #[derive(Default)]
 struct EdgeSums {
     /// Difference of the tool's normals and the pieces' own.
@@ -51,11 +52,17 @@ struct EdgeSums {
     walls_by: [DVec3; 2],
 }
 
+/// Reach of a tool whose own normals may count, m.
+pub(super) fn reach(tool: &ToolShape) -> Option<f64> {
+    let reach = tool.reach();
+    (reach >= LEAST_REACH * tool.thickness()).then_some(reach)
+}
+
 impl FootprintScratch {
     /// Mixes the tool's own normals into the sum of normals.
-    pub(super) fn turn_to_tool(&mut self, tool: &PlacedShape<'_>, sums: &mut Sums) {
-        let (thickness, reach) = (tool.shape.thickness(), tool.shape.reach());
-        if reach < LEAST_REACH * thickness || !sums.may_turn(thickness) {
+    pub(super) fn turn_to_tool(&mut self, tool: &PlacedShape<'_>, reach: f64, sums: &mut Sums) {
+        let thickness = tool.shape.thickness();
+        if !sums.may_turn(thickness) {
             return;
         }
         self.near.find_turnings(tool);
@@ -73,8 +80,7 @@ impl FootprintScratch {
         let zero = [DMat3::ZERO; 2];
         let mut edge = EdgeSums { difference_by: zero, ..EdgeSums::default() };
         for (near, turning) in self.near.pieces.iter().zip(&self.near.turnings) {
-            let Some((whole, whole_by)) = near.weigh_whole(self.near.margin) else { continue };
-            let (weight, by) = (whole * near.contact_share, whole_by.map(|by| by * near.contact_share));
+            let Some([(weight, by), (_, whole_by)]) = near.weigh_with_wall(self.near.margin) else { continue };
             let (turned, turned_by) = near.turned(turning, reach);
             let offset = (near.middle - self.near.centre).dot(near.normal);
             edge.difference += turned * weight;
@@ -194,7 +200,6 @@ mod tests {
     use crate::contact::SurfaceQuery;
     use crate::contact::footprint::{Plane, PressedSurface};
     use crate::contact::regular::FanFields;
-    use crate::contact::shape::ToolShape;
     use crate::contact::smooth::tests::{cube, near};
     use crate::contact::smooth::{FanWeights, SmoothSurface};
 

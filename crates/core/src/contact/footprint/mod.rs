@@ -118,6 +118,9 @@ struct MeanNormal {
     by: [DMat3; 2],
 }
 
+/// Weight of a piece, and its derivatives by the tool's position and rotation.
+type Weight = (f64, [DVec3; 2]);
+
 /// Sums over pieces; positions are relative to the tool's middle.
 #[derive(Clone, Copy)]
 struct Sums {
@@ -131,7 +134,7 @@ struct Sums {
     offset: f64,
     /// Weight of the walls beside them, which are no part of the contact.
     walls: f64,
-    /// Difference of the tool's normals, as of the latest search, and the pieces' own.
+    /// Difference of the tool's normals, as of the latest search, and the pieces' own, where the former may count.
     difference: DVec3,
 }
 
@@ -190,8 +193,11 @@ impl FootprintScratch {
         weights: &mut FanWeights,
     ) -> Option<Footprint> {
         self.flatten_walls(fine, known);
-        let mut sums = self.sum(tool.shape.reach())?;
-        self.turn_to_tool(tool, &mut sums);
+        let reach = edge_normal::reach(tool.shape);
+        let mut sums = self.sum(reach)?;
+        if let Some(reach) = reach {
+            self.turn_to_tool(tool, reach, &mut sums);
+        }
         let MeanNormal { normal, by: normal_by } = sums.mean_normal(known.normal);
         let inverse = 1.0 / sums.weight;
         let middle = sums.place * inverse;
@@ -226,7 +232,7 @@ impl FootprintScratch {
         }
     }
 
-    fn sum(&self, reach: f64) -> Option<Sums> {
+    fn sum(&self, reach: Option<f64>) -> Option<Sums> {
         let mut sums = Sums {
             weight: 0.0,
             weight_by: [DVec3::ZERO; 2],
@@ -239,15 +245,16 @@ impl FootprintScratch {
             difference: DVec3::ZERO,
         };
         for near in &self.near.pieces {
-            let Some((whole, whole_by)) = near.weigh_whole(self.near.margin) else { continue };
-            let (weight, by) = (whole * near.contact_share, whole_by.map(|by| by * near.contact_share));
+            let Some([(weight, by), (whole, _)]) = near.weigh_with_wall(self.near.margin) else { continue };
             let place = near.middle - self.near.centre;
             sums.walls += whole - weight;
             sums.weight += weight;
             sums.place += place * weight;
             sums.normal += near.normal * weight;
             sums.offset += place.dot(near.normal) * weight;
-            sums.difference += near.difference(reach) * weight;
+            if let Some(reach) = reach {
+                sums.difference += near.difference(reach) * weight;
+            }
             for k in 0..2 {
                 sums.weight_by[k] += by[k];
                 sums.place_by[k] += outer(place, by[k]);
@@ -315,13 +322,12 @@ impl FootprintScratch {
 
 impl NearPiece {
     /// Weight of a piece in the contact, and its derivatives by the tool's position and rotation; `None` for zero.
-    fn weigh(&self, margin: f64) -> Option<(f64, [DVec3; 2])> {
-        let (whole, by) = self.weigh_whole(margin)?;
-        Some((whole * self.contact_share, by.map(|by| by * self.contact_share)))
+    fn weigh(&self, margin: f64) -> Option<Weight> {
+        self.weigh_with_wall(margin).map(|[weight, _]| weight)
     }
 
-    /// Weight of a piece, whether it belongs to the contact or to a wall, and its derivatives.
-    fn weigh_whole(&self, margin: f64) -> Option<(f64, [DVec3; 2])> {
+    /// Weight of a piece in the contact, and that in the contact and in a wall together; `None` where the latter is zero.
+    fn weigh_with_wall(&self, margin: f64) -> Option<[Weight; 2]> {
         let nearness = 1.0 - self.distance / margin;
         let (eta, rise) = smooth_step(self.facing_cosine, FACING);
         if nearness <= 0.0 || eta <= 0.0 {
@@ -329,7 +335,8 @@ impl NearPiece {
         }
         let (by_distance, by_facing) = (-2.0 * nearness * eta / margin, nearness * nearness * rise);
         let by = [0, 1].map(|k| (self.by_pose[k] * by_distance + self.facing_cosine_by[k] * by_facing) * self.area);
-        Some((self.area * nearness * nearness * eta, by))
+        let whole = self.area * nearness * nearness * eta;
+        Some([(whole * self.contact_share, by.map(|by| by * self.contact_share)), (whole, by)])
     }
 
     /// Share to which the piece is a wall rising over a plane: one if it is steep, or more parallel to one of the `others`, and the

@@ -56,7 +56,7 @@ pub struct NearPiece {
     pub distance: f64,
     /// Its derivatives by the tool's position, and by its rotation about its origin, m.
     pub by_pose: [DVec3; 2],
-    /// The tool's own normal, from the piece towards the tool, where it has been found.
+    /// The tool's own normal, from the piece towards the tool, as of the latest search until its derivatives have been found.
     pub tool_normal: DVec3,
     /// Cosine between the normal and the direction to the tool's viewpoint.
     pub facing_cosine: f64,
@@ -145,8 +145,8 @@ impl PlacedShape<'_> {
         (cosine, [gradient, (viewpoint - self.position).cross(gradient)])
     }
 
-    /// Distance of a point from the tool, and its derivatives by position and rotation.
-    /// The tool's normal there, from the point towards the tool, comes third.
+    /// Distance of a point from the tool, its derivatives by position and rotation, and the tool's normal there, from the point
+    /// towards the tool.
     fn distance(&self, point: DVec3, centre: DVec3, headroom: f64) -> (f64, [DVec3; 2], DVec3) {
         let arm = centre - self.position;
         let above = (point - centre).dot(self.contact_normal).max(0.0);

@@ -20,9 +20,10 @@ impl ToolShape {
             Self::Ellipsoid { semi_axes } => around_ellipsoid(semi_axes, point),
             Self::Capsule { half_length, .. } => {
                 let nearest = point.z.clamp(0.0, 2.0 * half_length);
-                let (gradient, turning) = around(point - DVec3::Z * nearest, least);
+                let offset = point - DVec3::Z * nearest;
+                let (gradient, turning) = around(offset, least);
                 let along = if nearest == point.z { outer(DVec3::Z, DVec3::Z) } else { DMat3::ZERO };
-                (gradient, turning - along * (1.0 / (point - DVec3::Z * nearest).length().max(least)))
+                (gradient, turning - along * (1.0 / offset.length().max(least)))
             }
             Self::Punch { radius, rounding } => around_punch((radius, rounding), point, least),
             Self::Surface(ref surface) => (surface.signed_distance(point).1, DMat3::ZERO),
