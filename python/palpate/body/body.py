@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 
 import numpy as np
 import scipy
 
 from palpate.body.assembly import element_arrays, mass_matrix, stiffness_matrix
 from palpate.body.loads import Loads
-from palpate.body.material import Material, material_rows, warn_of_locking
+from palpate.body.material import Material, element_laws, material_rows, warn_of_locking
 from palpate.body.mechanism import find_mechanism
 from palpate.body.overlap import require_apart
 from palpate.body.supports import Fixed, element_components, fixed_mask, rigid_constraint_rank
@@ -76,6 +77,11 @@ class Body:
         materials = 1 if isinstance(self.material, Material) else len(self.material)
         counts = f"{len(mesh.nodes)} nodes, {len(mesh.tets)} {mesh.tets.shape[1]}-node tets"
         return f"Body({counts}, {materials} material{'s' if materials > 1 else ''}, {fixed} nodes fixed)"
+
+    @cached_property
+    def is_hyperelastic(self) -> bool:
+        """Whether a material of it has a law beyond small strain."""
+        return any(name != "linear" for name, *_ in element_laws(self.mesh, self.material)[0])
 
     @property
     def fixed_nodes(self) -> np.ndarray:

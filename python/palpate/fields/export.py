@@ -28,17 +28,25 @@ FACES, TETS = {3: "triangle", 6: "triangle6"}, {4: "tetra", 10: "tetra10"}
 
 
 def volume_mesh(
-    nodes: np.ndarray, tets: np.ndarray, displacements: np.ndarray, field: SurfaceStress, regions: np.ndarray
+    nodes: np.ndarray,
+    tets: np.ndarray,
+    displacements: np.ndarray,
+    field: SurfaceStress,
+    regions: np.ndarray,
+    is_hyperelastic: bool,
 ) -> meshio.Mesh:
     """Tetrahedra of a body with its displacement (m), strain and stress (Pa) at all nodes."""
     import meshio
 
+    finite = {"green_lagrange_strain": components(field.green_lagrange_strain)} if is_hyperelastic else {}
+    measured = field.green_lagrange_strain if is_hyperelastic else field.strain
     data = {
         "displacement": displacements,
         "strain": components(field.strain),
         "stress": components(field.stress),
-        "largest_strain": largest_magnitude(field.strain),
+        "largest_strain": largest_magnitude(measured),
         "von_mises": field.von_mises,
+        **finite,
     }
     return meshio.Mesh(nodes, [(TETS[tets.shape[1]], tets)], point_data=data, cell_data={"region": [regions]})
 

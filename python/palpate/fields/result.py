@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -10,7 +11,7 @@ from palpate.fields.export import surface_mesh, volume_mesh
 from palpate.fields.exported import Exportable
 from palpate.fields.picture import DeformedSurface
 from palpate.fields.strain_measure import StrainReporting, StrainSource
-from palpate.fields.stress import StressRecovery, SurfaceStress
+from palpate.fields.stress import StressRecovery
 from palpate.fields.surface_strain import SurfaceStrain
 
 if TYPE_CHECKING:
@@ -38,14 +39,16 @@ class Result(StrainReporting, Exportable):
 
     Of a body whose elements are known, files and meshes hold its tetrahedra with fields at all nodes. These are
     ``displacement`` (m), ``strain`` and ``stress`` (Pa) by the components xx, yy, zz, xy, yz, xz, ``largest_strain``
-    (principal, in magnitude) and ``von_mises`` (Pa). The inside is in equilibrium with the surface. A bare store knows
-    the surface
-    alone: its faces with ``displacement`` and ``largest_strain``.
+    (principal, in magnitude) and ``von_mises`` (Pa). Frames of a hyperelastic body have ``green_lagrange_strain`` as
+    well, and ``largest_strain`` is of that. The inside is in equilibrium with the surface. A bare store knows the
+    surface alone: its faces with ``displacement`` and ``largest_strain``.
     """
 
     _source: ResultSource
     # Young's modulus now over that of the source.
     _stiffness_scale: float = 1.0
+    # Whether its displacements are those of a material beyond small strain.
+    _is_hyperelastic: bool = False
 
     def to_meshio(self) -> meshio.Mesh:
         """Body at rest with its displacement, strain and stress at the nodes, as a mesh of meshio."""
@@ -58,8 +61,8 @@ class Result(StrainReporting, Exportable):
             recovery, mesh = source.stress_everywhere, source.body.mesh
             everywhere = recovery.interior.extend(self.displacements)
             field = recovery.recover_inside(everywhere)
-            field = SurfaceStress(self._stiffness_scale * field.stress, field.strain)
-            written = volume_mesh(mesh.nodes, mesh.tets, everywhere, field, mesh.regions)
+            field = replace(field, stress=self._stiffness_scale * field.stress)
+            written = volume_mesh(mesh.nodes, mesh.tets, everywhere, field, mesh.regions, self._is_hyperelastic)
         rows = source.surface_nodes if source.body is not None else slice(None)
         for name, values in self._at_surface_nodes().items():
             data = np.zeros((len(written.points), *values.shape[1:]))

@@ -38,6 +38,10 @@ FLAT = 1e-2
 # Components in the order xx, yy, zz, xy, yz, zx.
 FIRST, SECOND = np.array([0, 1, 2, 0, 1, 2]), np.array([0, 1, 2, 1, 2, 0])
 TENSOR = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
+# Those of the strain from `du_i/dx_j` in the order xx, xy, xz, yx, ..
+STRAIN_OF_GRADIENT = np.zeros((6, 9))
+STRAIN_OF_GRADIENT[np.arange(6), 3 * FIRST + SECOND] += 0.5
+STRAIN_OF_GRADIENT[np.arange(6), 3 * SECOND + FIRST] += 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,12 +53,20 @@ class SurfaceStress(ComparedByValue):
     stress
         (s, 3, 3) Pa, tension positive.
     strain
-        (s, 3, 3), infinitesimal, `(grad u + grad u^T) / 2`.
+        (s, 3, 3), infinitesimal, `(H + H^T) / 2`.
+    gradient
+        (s, 3, 3) `H`, `du_i/dx_j` in row `i`.
 
     """
 
     stress: np.ndarray
     strain: np.ndarray
+    gradient: np.ndarray
+
+    @cached_property
+    def green_lagrange_strain(self) -> np.ndarray:
+        """Strain at finite deformation, `(H + H^T + H^T H) / 2`, (s, 3, 3): zero where a body only turns."""
+        return self.strain + 0.5 * np.einsum("nki,nkj->nij", self.gradient, self.gradient)
 
     @cached_property
     def von_mises(self) -> np.ndarray:
@@ -106,7 +118,7 @@ class StressRecovery:
         used = np.unique(patches.indices)
         points = SAMPLES[mesh.tets.shape[1]]
         tets = mesh.tets[used]
-        self._strain = _strain_operator(tetrahedron_gradients(mesh.nodes, tets, points), tets, len(mesh.nodes))
+        self._gradient = _gradient_operator(tetrahedron_gradients(mesh.nodes, tets, points), tets, len(mesh.nodes))
         e, nu, _ = materials.T
         self.largest_youngs_modulus = float(e.max())
         self._lame = nu * e / ((1 + nu) * (1 - 2 * nu)), e / (2 * (1 + nu))
@@ -118,7 +130,7 @@ class StressRecovery:
     @property
     def strain_operator(self) -> scipy.sparse.csr_array:
         """Strain at the nodes from the displacements of all, (6 s, 3 n): xx, yy, zz, xy, yz, zx of each node, 1/m."""
-        return (scipy.sparse.kron(self._fit, scipy.sparse.eye_array(6)).tocsr() @ self._strain).tocsr()
+        return (scipy.sparse.kron(self._fit, STRAIN_OF_GRADIENT).tocsr() @ self._gradient).tocsr()
 
     def recover(self, displacements: np.ndarray) -> SurfaceStress:
         """Stress and strain for displacements of the surface nodes, (s, 3) m.
@@ -133,28 +145,24 @@ class StressRecovery:
 
     def recover_inside(self, everywhere: np.ndarray) -> SurfaceStress:
         """Stress and strain for displacements of all nodes, (n, 3) m, as the interior extends them."""
-        strain = self._fit @ (self._strain @ everywhere.ravel()).reshape(-1, 6)
+        gradient = self._fit @ (self._gradient @ everywhere.ravel()).reshape(-1, 9)
+        strain = gradient @ STRAIN_OF_GRADIENT.T
         lam, mu = self._lame
         stress = 2 * mu[:, None] * strain
         stress[:, :3] += (lam * strain[:, :3].sum(axis=1))[:, None]
-        return SurfaceStress(stress[:, TENSOR], strain[:, TENSOR])
+        return SurfaceStress(stress[:, TENSOR], strain[:, TENSOR], gradient.reshape(-1, 3, 3))
 
 
-def _strain_operator(gradients: np.ndarray, tets: np.ndarray, node_count: int) -> scipy.sparse.csr_array:
-    """Strain, `e_ij = (du_i/dx_j + du_j/dx_i) / 2`, in six components at all samples, from all displacements."""
+def _gradient_operator(gradients: np.ndarray, tets: np.ndarray, node_count: int) -> scipy.sparse.csr_array:
+    """`du_i/dx_j` in the order xx, xy, xz, yx, .. at all samples, from all displacements."""
     elements, samples, corners, _ = gradients.shape
-    rows = np.arange(6 * elements * samples).reshape(elements, samples, 1, 6)
-    nodes = tets[:, None, :, None]
-    shape = (elements, samples, corners, 6)
-    halves = [
-        (gradients[..., SECOND] / 2, 3 * nodes + FIRST),
-        (gradients[..., FIRST] / 2, 3 * nodes + SECOND),
-    ]
-    data = np.concatenate([values.ravel() for values, _ in halves])
-    columns = np.concatenate([np.broadcast_to(at, shape).ravel() for _, at in halves])
-    places = (np.tile(np.broadcast_to(rows, shape).ravel(), 2), columns)
-    size = (6 * elements * samples, 3 * node_count)
-    return scipy.sparse.coo_array((data, places), shape=size).tocsr()
+    shape = (elements, samples, corners, 3, 3)
+    rows = np.arange(9 * elements * samples).reshape(elements, samples, 1, 3, 3)
+    columns = 3 * tets[:, None, :, None, None] + np.arange(3)[:, None]
+    values = gradients[:, :, :, None, :]
+    data, row, column = (np.broadcast_to(part, shape).ravel() for part in (values, rows, columns))
+    size = (9 * elements * samples, 3 * node_count)
+    return scipy.sparse.coo_array((data, (row, column)), shape=size).tocsr()
 
 
 def _patches(body: Body, nodes: np.ndarray) -> tuple[scipy.sparse.csr_array, np.ndarray]:

@@ -12,11 +12,6 @@ from palpate.body.material import element_laws
 from palpate.green.function import GreensFunction
 
 
-def is_hyperelastic(body: Body) -> bool:
-    """Whether a material of the body has a law beyond small strain."""
-    return any(name != "linear" for name, *_ in element_laws(body.mesh, body.material)[0])
-
-
 def force_series(
     green: GreensFunction, body: Body, radius: float, progress: Callable[[int, int], None] | None = None
 ) -> tuple[np.ndarray, np.ndarray] | None:
@@ -40,7 +35,7 @@ def force_series(
         (docs/theory.md, chapter 11).
 
     """
-    if green.path is None or body.loads is not None or not is_hyperelastic(body):
+    if green.path is None or body.loads is not None or not body.is_hyperelastic:
         return None
     problem = problem_arrays(body, green.touchable_nodes)
     return _native.series(problem, element_laws(body.mesh, body.material), radius, green.path, green.key, progress)

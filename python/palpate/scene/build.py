@@ -63,6 +63,11 @@ class BuiltBody:
     orientation: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
     series: tuple[tuple[float, np.ndarray], ...] = ()
 
+    @property
+    def is_hyperelastic(self) -> bool:
+        """Whether its elements are known, and a material of it has a law beyond small strain."""
+        return self.body is not None and self.body.is_hyperelastic
+
     def points_to_scene(self, points: np.ndarray) -> np.ndarray:
         """Points (..., 3) of the body's own frame in the scene, m."""
         return rotated(points, self.orientation) + np.array(self.position)

@@ -9,6 +9,7 @@ import time
 import warnings
 import weakref
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -22,7 +23,6 @@ from palpate.dynamics import Energy
 from palpate.errors import SceneError, SimulationError, TouchWarning
 from palpate.fields import StrainMeasure, SurfaceStress
 from palpate.green import GreensFunction
-from palpate.green.series import is_hyperelastic
 from palpate.input_file import require_writable
 from palpate.scene import BodyMotion, BuiltBody, BuiltScene, Scene
 from palpate.simulation.about import about
@@ -314,7 +314,7 @@ class Simulation(Adjustable, SceneEditing):
         )
 
     def _limit_text(self, what: str) -> str:
-        if any(body.body is not None and is_hyperelastic(body.body) for body in self.bodies):
+        if any(body.is_hyperelastic for body in self.bodies):
             return (
                 f"{what} was held where the law of its material ends, so the force stays as it was at that depth: "
                 "press less deep"
@@ -376,7 +376,7 @@ class Simulation(Adjustable, SceneEditing):
             raise SceneError("a body from a store knows only its surface: stress needs its elements")
         field = green.stress_recovery.recover(displacements)
         # A stiffness changed while running scales stress, not strain.
-        return SurfaceStress(self.stiffness_scale_of(body) * field.stress, field.strain)
+        return replace(field, stress=self.stiffness_scale_of(body) * field.stress)
 
     def drain_log(self) -> np.ndarray:
         """Rows of the 1 kHz log since the last call.

@@ -46,7 +46,8 @@ class Field:
 
 
 DISPLACEMENT = Field("displacement", "Displacement", "mm")
-STRAIN = Field("strain", "Largest principal strain", "%")
+STRAIN = Field("strain", "Largest principal strain, linear", "%")
+FINITE_STRAIN = Field("strain", "Largest principal strain, Green-Lagrange", "%")
 SURFACE_STRAIN = Field("strain", "Strain in the surface", "%")
 VON_MISES = Field("von_mises", "Von Mises stress", "Pa")
 PRINCIPAL = Field("principal_stress", "First principal stress", "Pa", signed=True)
@@ -93,9 +94,10 @@ class Fields:
         self._measure = measure = simulation.bodies[body].green.strain_measure
         self._surface = measure if isinstance(measure, SurfaceStrain) else None
         self._recovery = measure.recovery if isinstance(measure, ElementStrain) else None
-        self.offered = [DISPLACEMENT, SURFACE_STRAIN] if self._recovery is None else [DISPLACEMENT, STRAIN]
+        self._strain = FINITE_STRAIN if simulation.bodies[body].is_hyperelastic else STRAIN
+        self.offered = [DISPLACEMENT, SURFACE_STRAIN]
         if self._recovery is not None:
-            self.offered += [VON_MISES, PRINCIPAL]
+            self.offered = [DISPLACEMENT, self._strain, VON_MISES, PRINCIPAL]
         self._map = surface_map
         if surface_map is not None:
             known = [PALPATED] if surface_map.change is None else [PALPATED_CHANGE, PALPATED]
@@ -109,7 +111,7 @@ class Fields:
         pose = self._of(displacements)
         if self._recovery is None:
             return pose.once("largest", lambda: self._measure.largest(displacements))
-        return float(largest_magnitude(self._stress(pose).strain).max())
+        return float(self._magnitude(self._stress(pose)).max())
 
     def picture(self, name: str, displacements: np.ndarray, interior: bool, full_scale: float | None = None) -> Picture:
         """Field of a pose, up to a value that is given in its unit, or to its largest one.
@@ -160,11 +162,16 @@ class Fields:
             assert self._surface is not None
             return 100.0 * self._surface.at_nodes(displacements)
         found = self._stress_inside(pose) if inside else self._stress(pose)
-        if field is STRAIN:
-            return 100.0 * largest_magnitude(found.strain)
+        if field is self._strain:
+            return 100.0 * self._magnitude(found)
         # A stiffness changed while running scales stress, not strain.
         scale = self._simulation.stiffness_scale_of(self._body)
         return scale * (found.von_mises if field is VON_MISES else extreme_values(found.stress)[0])
+
+    def _magnitude(self, found: SurfaceStress) -> np.ndarray:
+        """Give the largest principal strain in magnitude at the nodes."""
+        is_finite = self._strain is FINITE_STRAIN
+        return largest_magnitude(found.green_lagrange_strain if is_finite else found.strain)
 
     def _range(self, field: Field, largest: float) -> float:
         now = time.monotonic()

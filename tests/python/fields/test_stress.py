@@ -46,6 +46,19 @@ def test_rigid_motion_is_free_of_strain():
     assert field.strain_magnitude.max() <= 1e-14
 
 
+def test_green_lagrange_strain_is_that_of_the_stretch_and_free_of_turning():
+    """`F = R U` has the strain `(U^2 - 1) / 2`, whatever the turn `R`; the infinitesimal one is far from it."""
+    mesh = box_mesh(cells=(3, 3, 3), jitter=0.25, seed=4)
+    body = palpate.Body(mesh, material=palpate.Material(E, NU), fixed=lambda p: p[:, 0] < 1e-9)
+    stretch = np.diag([1.3, 0.9, 0.8])
+    turn = np.array([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
+    positions = mesh.nodes[mesh.surface_nodes]
+    field = StressRecovery(body).recover(positions @ (turn @ stretch).T - positions)
+    expected = (stretch @ stretch - np.eye(3)) / 2
+    assert np.abs(field.green_lagrange_strain - expected).max() < 1e-9
+    assert np.abs(field.strain - expected).max() > 0.2
+
+
 def test_materials_in_series_carry_the_same_stress():
     """A bar with nu = 0 of two materials in tension: one stress everywhere, to the last node beside the joint."""
     mesh = box_mesh(cells=(3, 3, 8), size=(0.02, 0.02, 0.08), jitter=0)

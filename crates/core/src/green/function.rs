@@ -79,6 +79,11 @@ impl GreensFunction {
         self.entries.node_order().touchable(node)
     }
 
+    /// One for each axis along which surface node `node` is free, zero for one along which it is supported.
+    pub fn free_axes(&self, node: usize) -> DVec3 {
+        DVec3::from_array(std::array::from_fn(|axis| if self.row_is_fixed[3 * node + axis] { 0.0 } else { 1.0 }))
+    }
+
     /// Whether the rows of surface node `node` are in memory, so that a tick may ask for them; those of touchable nodes are.
     pub fn is_resident(&self, node: usize) -> bool {
         self.entries.is_resident(node)

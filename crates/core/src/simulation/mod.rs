@@ -4,12 +4,14 @@
 //! `input` has the inputs of a tick, `model` the constant data, `state` the data that evolve. A `law` begins, follows and ends a
 //! contact and finds its force. `limit` keeps the strain in the range of linear elasticity. `solve` finds the forces of all linear
 //! contacts of a body together. A body in motion has a `motion`, which a `strike` may start, and an `energy` balance. On a body at
-//! rest `passivity` prevents contacts from releasing more energy than tools have put in. `snapshot` has the data to draw, `taxels` the pressures on a tool.
+//! rest `passivity` prevents contacts from releasing more energy than tools have put in. `snapshot` has the data to draw, `indented`
+//! the drawn surface below a tool, `taxels` the pressures on a tool.
 
 mod body;
 mod contact_check;
 mod contacts;
 mod energy;
+mod indented;
 mod input;
 mod law;
 mod limit;

@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::MAX_TOOLS;
 use super::body::BodyModel;
 use super::contacts::Contacts;
+use super::indented::{apply, indentations};
 use super::model::Model;
 use super::state::{State, ToolState};
 use super::strike::gather_rows;
@@ -71,10 +72,12 @@ impl Snapshot {
         self.bodies.get(body).map_or(0.0, |body| body.time)
     }
 
-    /// Displacements of some surface nodes of a body, m, in its frame.
+    /// Displacements of some surface nodes of a body, m, in its frame: [`Self::displacements`] has all.
     pub fn displacements_of(&self, model: &Model, body: usize, nodes: &[u32]) -> Vec<DVec3> {
         let modal_beyond_static = self.modal_beyond_static(model, body);
-        nodes.iter().map(|&node| self.displacement_of(model, body, &modal_beyond_static, node)).collect()
+        let displacement = |node| self.displacement_of(model, body, &modal_beyond_static, node);
+        let indented = indentations(model, body, self.contacts.iter(), displacement);
+        nodes.iter().map(|&node| apply(&indented, &model.bodies[body], node, displacement(node))).collect()
     }
 
     fn displacement_of(&self, model: &Model, body: usize, modal_beyond_static: &[Lanes], node: u32) -> DVec3 {
@@ -93,7 +96,7 @@ impl Snapshot {
     }
 
     /// Displacements of all surface dofs (3s) of a body, m, in its frame: `u = u_free + Psi W f`, and `Phi (q - p / k)` of a
-    /// body in motion.
+    /// body in motion. The surface of a hyperelastic body meets the tools.
     pub fn displacements(&self, model: &Model, body: usize) -> Vec<f64> {
         let fixed = &model.bodies[body];
         let mut displacements = fixed.free.clone();
@@ -105,6 +108,11 @@ impl Snapshot {
             let mut moved = vec![0.0; displacements.len()];
             dynamics.modes.read(&self.modal_beyond_static(model, body), 0.., &mut moved);
             displacements.iter_mut().zip(&moved).for_each(|(u, m)| *u += m);
+        }
+        let displacement = |node: u32| DVec3::from_slice(&displacements[3 * node as usize..][..3]);
+        let indented = indentations(model, body, self.contacts.iter(), displacement);
+        for (node, displacement) in displacements.as_chunks_mut::<3>().0.iter_mut().enumerate() {
+            *displacement = apply(&indented, fixed, node as u32, DVec3::from(*displacement)).to_array();
         }
         displacements
     }
