@@ -11,10 +11,12 @@ from browser import MARKS, opened
 from web_site import served
 
 import palpate
+from palpate.cli.impulse import impulse_scene
 from palpate.scene import model_scene
 from palpate.viewer.site import write_site
 from viewer import test_viewer_controls as controls
 from viewer import test_viewer_page as pages
+from viewer import test_viewer_page_motion as motion
 from viewer import test_viewer_thin as thin
 from viewer import test_viewer_two_tools as two_tools
 
@@ -73,6 +75,15 @@ def site_of_others(cache, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
+def moving_site(cache, tmp_path_factory):
+    """The paper's beam in motion, with a strike of its own."""
+    with served_site(
+        {"beam": impulse_scene("beam", paper=True)}, cache, tmp_path_factory.mktemp("static") / "site"
+    ) as address:
+        yield address
+
+
+@pytest.fixture(scope="module")
 def program(site):
     return SimpleNamespace(address=f"{site}/index.html?scene=liver")
 
@@ -102,3 +113,9 @@ def test_of_the_page_of_another_scene(chromium, site_of_others, test, scene):
         test(chromium, program, (1280, 720))
     else:
         test(chromium, program)
+
+
+@pytest.mark.slow
+def test_of_the_page_of_a_body_in_motion(chromium, moving_site):
+    with opened(chromium, SimpleNamespace(address=f"{moving_site}/index.html?scene=beam")) as page:
+        motion.test_a_click_strikes_in_motion(page)

@@ -6,6 +6,7 @@ import { OfferedTools } from "./offered_tools";
 import { BodyPicture } from "./picture";
 import type { Program, Tick } from "./program";
 import type { ScenePackage } from "./scene_package";
+import { WatchedNode } from "./watched_node";
 
 /** Numbers of a row of the log. */
 const ROW = 11;
@@ -33,6 +34,7 @@ export class WorkerSession {
   private history: number[] = [];
   private bodyTime = 0;
   private motion: MotionFrame | null;
+  private readonly watched: WatchedNode | null;
   private begun = 0;
   private readonly tools: OfferedTools;
 
@@ -47,6 +49,10 @@ export class WorkerSession {
     this.pictures = data.bodies.map((body, i) => new BodyPicture(arrays, i, body.nodes_per_face, body.size));
     this.settings = data.settings;
     this.tools = new OfferedTools(data, scene.scene);
+    const array = (name: string) => arrays.get(`${data.motion!.body}/${name}`)!;
+    this.watched = data.motion
+      ? new WatchedNode(array("positions") as Float32Array, array("drawn") as Uint32Array, data.motion.watched)
+      : null;
     this.motion = this.begin();
     this.text({ type: "welcome", role: "control", version: data.version, models });
     replies.message(this.tools.sceneMessage());
@@ -60,11 +66,16 @@ export class WorkerSession {
 
   /** A loop that begins: what it watches, its pace; the motion of its frames. */
   private begin(): MotionFrame | null {
-    const { program, settings, scene: { data: { motion } } } = this;
+    const { settings, watched } = this;
     if (settings.time_scale !== null) this.apply("time_scale", 0, settings.time_scale);
-    if (!motion) return null;
-    program.command({ do: "watch", body: motion.body, node: motion.watched });
-    return { watched: motion.watched, struck_at: null, mode: null };
+    if (!watched) return null;
+    this.watch(watched);
+    return { watched: watched.row, struck_at: null, mode: null };
+  }
+
+  private watch(watched: WatchedNode): void {
+    this.program.command({ do: "watch", body: this.scene.data.motion!.body, node: watched.node });
+    if (this.motion) this.motion = { ...this.motion, watched: watched.row };
   }
 
   /** Makes the ticks that are due, and a frame if the page has shown the last one. */
@@ -219,6 +230,8 @@ export class WorkerSession {
     const where = rotated(point, placed.orientation).map((x, k) => x + placed.position[k]!) as Vec3;
     this.program.command({ do: "strike", body, point: where, impulse: rotated(impulse, placed.orientation), duration: motion.duration });
     this.motion = { ...this.motion, struck_at: this.bodyTime };
+    this.watched!.watch(point);
+    this.watch(this.watched!);
   }
 
   private record(on: boolean): void {
@@ -238,6 +251,7 @@ export class WorkerSession {
   private sendFrame(nowMs: number): void {
     const { program, view, scene } = this;
     const tick = program.tick();
+    if (this.watched?.follow(tick.contacts, scene.data.motion!.body)) this.watch(this.watched);
     this.takeLog();
     const pictures = this.pictures.map((picture, body) =>
       picture.picture(program.displacements(body), view.field, view.max, view.cutaway, nowMs),
