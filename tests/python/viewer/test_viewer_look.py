@@ -96,6 +96,20 @@ def test_a_screenshot_carries_force_legend_and_scale(page, tmp_path):
     page.mouse.up()
 
 
+@pytest.mark.slow
+def test_a_screenshot_has_all_pixels_of_a_large_window(chromium, program, tmp_path):
+    """Frames of a window of more than four million pixels are drawn with fewer; a picture that is kept is not."""
+    size = (1400, 1100)
+    with opened(chromium, program, size=size, sharpness=2.0) as page:
+        drawn_pixels = page.evaluate("document.getElementById('canvas').width")
+        shot = saved(page, tmp_path)
+        width = page.locator("#canvas").bounding_box()["width"]
+        assert drawn_pixels < 2 * width - 10
+        assert shot.shape[1] == pytest.approx(2 * width, abs=2)
+        # The page goes on as before.
+        assert page.evaluate("document.getElementById('canvas').width") == drawn_pixels
+
+
 def test_the_scale_bar_is_true_and_follows_the_zoom(page):
     def told():
         bar = page.get_by_test_id("scale")

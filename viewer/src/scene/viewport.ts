@@ -143,6 +143,16 @@ export class Viewport {
     this.renderer.render(this.scene, this.camera);
   }
 
+  /** Draws at once with all pixels of the screen, too many for every frame of a large window, and lets them be copied. */
+  renderInFull(copy: () => void): void {
+    const ratio = this.renderer.getPixelRatio();
+    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, PIXEL_RATIO_MAX));
+    this.render();
+    copy();
+    this.renderer.setPixelRatio(ratio);
+    this.render();
+  }
+
   /** Calls a listener whenever the bodies are seen from elsewhere, or larger, or smaller. */
   onView(listener: () => void): void {
     this.viewListeners.push(listener);

@@ -10,14 +10,16 @@ const OVERLAY_IDS = ["readout", "legend", "scale", "scale-banner", "mode-banner"
 /** As PNG, null where the browser cannot. */
 export function takePicture(viewport: Viewport): Promise<Blob | null> {
   const { canvas } = viewport;
-  const picture = create("canvas", { width: canvas.width, height: canvas.height });
+  const picture = create("canvas");
   const context = picture.getContext("2d")!;
-  paintBackdrop(context, picture.width, picture.height);
   // In one go: the browser may clear what it has shown.
-  viewport.render();
-  context.drawImage(canvas, 0, 0);
+  viewport.renderInFull(() => {
+    [picture.width, picture.height] = [canvas.width, canvas.height];
+    paintBackdrop(context, picture.width, picture.height);
+    context.drawImage(canvas, 0, 0);
+  });
   const { left, top, width } = canvas.getBoundingClientRect();
-  const scale = canvas.width / width;
+  const scale = picture.width / width;
   context.scale(scale, scale);
   context.translate(-left, -top);
   for (const id of OVERLAY_IDS) paint(context, byId(id));
