@@ -4,23 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from palpate.dynamics import Energy
 from palpate.equality import ComparedByValue
-from palpate.fields import (
-    DeformedSurface,
-    ElementStrain,
-    Exportable,
-    Result,
-    ResultSource,
-    largest_magnitude,
-    placed,
-    together,
-)
+from palpate.fields import DeformedSurface, Exportable, Result, ResultSource, placed, together
 from palpate.scene import BuiltBody
 from palpate.vectors import brief
 
@@ -117,18 +107,6 @@ class BodyFrame(ComparedByValue, Result):
     @property
     def _is_hyperelastic(self) -> bool:
         return self._place.is_hyperelastic
-
-    @cached_property
-    def largest_strain(self) -> float:
-        """Largest principal strain in magnitude over the surface; milliseconds, when read.
-
-        Of a hyperelastic body it is the Green-Lagrange strain, else the infinitesimal one.
-        """
-        measure = self._source.strain_measure
-        if self._is_hyperelastic and isinstance(measure, ElementStrain):
-            field = measure.recovery.recover(self.displacements)
-            return float(largest_magnitude(field.green_lagrange_strain).max())
-        return measure.largest(self.displacements)
 
     def in_scene(self) -> meshio.Mesh:
         """Give :meth:`to_meshio` where the body stands in the scene."""

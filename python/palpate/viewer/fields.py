@@ -111,7 +111,7 @@ class Fields:
         pose = self._of(displacements)
         if self._recovery is None:
             return pose.once("largest", lambda: self._measure.largest(displacements))
-        return float(self._magnitude(self._stress(pose)).max())
+        return float(largest_magnitude(self._stress(pose).strain).max())
 
     def picture(self, name: str, displacements: np.ndarray, interior: bool, full_scale: float | None = None) -> Picture:
         """Field of a pose, up to a value that is given in its unit, or to its largest one.
