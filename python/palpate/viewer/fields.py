@@ -94,10 +94,10 @@ class Fields:
         self._measure = measure = simulation.bodies[body].green.strain_measure
         self._surface = measure if isinstance(measure, SurfaceStrain) else None
         self._recovery = measure.recovery if isinstance(measure, ElementStrain) else None
-        self._strain = FINITE_STRAIN if simulation.bodies[body].is_hyperelastic else STRAIN
         self.offered = [DISPLACEMENT, SURFACE_STRAIN]
         if self._recovery is not None:
-            self.offered = [DISPLACEMENT, self._strain, VON_MISES, PRINCIPAL]
+            strain = FINITE_STRAIN if simulation.bodies[body].is_hyperelastic else STRAIN
+            self.offered = [DISPLACEMENT, strain, VON_MISES, PRINCIPAL]
         self._map = surface_map
         if surface_map is not None:
             known = [PALPATED] if surface_map.change is None else [PALPATED_CHANGE, PALPATED]
@@ -162,16 +162,13 @@ class Fields:
             assert self._surface is not None
             return 100.0 * self._surface.at_nodes(displacements)
         found = self._stress_inside(pose) if inside else self._stress(pose)
-        if field is self._strain:
-            return 100.0 * self._magnitude(found)
+        if field is STRAIN:
+            return 100.0 * largest_magnitude(found.strain)
+        if field is FINITE_STRAIN:
+            return 100.0 * largest_magnitude(found.green_lagrange_strain)
         # A stiffness changed while running scales stress, not strain.
         scale = self._simulation.stiffness_scale_of(self._body)
         return scale * (found.von_mises if field is VON_MISES else extreme_values(found.stress)[0])
-
-    def _magnitude(self, found: SurfaceStress) -> np.ndarray:
-        """Give the largest principal strain in magnitude at the nodes."""
-        is_finite = self._strain is FINITE_STRAIN
-        return largest_magnitude(found.green_lagrange_strain if is_finite else found.strain)
 
     def _range(self, field: Field, largest: float) -> float:
         now = time.monotonic()

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from palpate import Material
-from palpate.simulation import Simulation
 from palpate.validation.verify.contact.loop import loop_of, sphere
 from palpate.validation.verify.contact.reference import Block, body_on_table, top_nodes
 from palpate.validation.verify.solution import green_of
@@ -34,15 +33,15 @@ def greens():
     return {law: (body := body_of(law), green_of(body, touch=top_nodes(body))) for law in ("neo-hookean", "linear")}
 
 
-def pressed(greens, law: str, tool: str, depth: float) -> tuple[Simulation, np.ndarray]:
-    """Simulation, and displacements (s, 3), m, of the surface under a tool at a depth."""
+def pressed(greens, law: str, tool: str, depth: float) -> np.ndarray:
+    """Displacements (s, 3), m, of the surface under a tool at a depth."""
     body, green = greens[law]
     simulation = loop_of(body, green, [TOOLS[tool]])
     lowest = 0.0 if tool == "punch" else RADIUS
     path = PLACE + (lowest - np.arange(-5e-4, depth + 1e-9, 1e-4))[:, None] * [0.0, 0.0, 1.0]
     turned = np.tile(LYING if tool == "capsule" else (1.0, 0.0, 0.0, 0.0), (len(path), 1))
     recording = simulation.play(path, turned, watch=green.surface_nodes)
-    return simulation, recording.displacements[-1]
+    return recording.displacements[-1]
 
 
 def distances(tool: str, origin: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -65,7 +64,7 @@ def test_the_drawn_surface_of_a_hyperelastic_body_meets_the_tool(greens, tool, d
     their middle: elements of 12 mm do not follow a rim.
     """
     _, green = greens["neo-hookean"]
-    _, moved = pressed(greens, "neo-hookean", tool, depth)
+    moved = pressed(greens, "neo-hookean", tool, depth)
     places = green.surface_positions + moved
     triangles = np.searchsorted(green.surface_nodes, green.surface_triangles)
     origin = PLACE - (0.0, 0.0, depth - (0.0 if tool == "punch" else RADIUS))
@@ -81,7 +80,7 @@ def test_far_from_the_tool_the_surface_is_that_of_the_force_alone(greens):
     """Displacements are proportional to the force, everywhere if the law is linear; supports do not move."""
     for law in ("linear", "neo-hookean"):
         body, green = greens[law]
-        shallow, deep = (pressed(greens, law, "sphere", depth)[1] for depth in (1e-3, 6e-3))
+        shallow, deep = (pressed(greens, law, "sphere", depth) for depth in (1e-3, 6e-3))
         far = np.linalg.norm(green.surface_positions - PLACE, axis=1) > (0.03 if law == "neo-hookean" else 0.0)
         factor = np.linalg.norm(deep[far]) / np.linalg.norm(shallow[far])
         assert np.linalg.norm(deep[far] - factor * shallow[far]) < 0.01 * np.linalg.norm(deep[far])

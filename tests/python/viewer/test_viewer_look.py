@@ -106,7 +106,7 @@ def test_a_screenshot_has_all_pixels_of_a_large_window(chromium, program, tmp_pa
         width = page.locator("#canvas").bounding_box()["width"]
         assert drawn_pixels < 2 * width - 10
         assert shot.shape[1] == pytest.approx(2 * width, abs=2)
-        # The page goes on as before.
+        # Frames are drawn with fewer pixels again.
         assert page.evaluate("document.getElementById('canvas').width") == drawn_pixels
 
 

@@ -3,7 +3,7 @@ import { describe, expect, it } from "vitest";
 import type { ContactMessage, Vec3 } from "../net/protocol";
 import { WatchedNode } from "./watched_node";
 
-// Four nodes along x, of which every other one is drawn.
+// Nodes at x = 0, 1, 2 and 3; those at 0 and 2 are drawn.
 const POSITIONS = new Float32Array([0, 0, 0, 1, 0, 0, 2, 0, 0, 3, 0, 0]);
 const DRAWN = new Uint32Array([0, 2]);
 

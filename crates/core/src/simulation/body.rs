@@ -180,6 +180,11 @@ impl BodyModel {
         is_thin_at(&self.query, &self.loaded, contact.point, contact.normal, thickness_for(shape))
     }
 
+    /// Displacement of a surface node by the loads of the body, m.
+    pub(super) fn load_displacement(&self, node: usize) -> DVec3 {
+        DVec3::from_slice(&self.free[3 * node..][..3])
+    }
+
     /// Adds prepared data, before they are shared.
     fn preparing(mut self, complete: impl FnOnce(&mut PreparedBody)) -> Result<Self> {
         let shared = || Error::Invalid("the body is part of a scene already: it cannot be changed".into());

@@ -1,9 +1,8 @@
 //! Displacement of the drawn surface below a tool that indents a hyperelastic body.
 //!
-//! `Psi W f` is the displacement by a force that is spread over a patch of nodes. The contact is smaller: by the law the tool
-//! has approached by `d = d_local(F) + C_reg F + ..`, of which the patch has moved by less. What is missing is the difference
-//! between the surface displacements of a half-space under one force on two areas. It is there around the contact only, by
-//! Saint-Venant's principle, and is drawn as
+//! `Psi W f` is the displacement by a force on a patch of nodes, which is larger than the contact. By the law the tool has
+//! approached by `d = d_local(F) + C_reg F + ..`; the patch moves less. The difference is that of the surface of a half-space
+//! under one force on two areas. By Saint-Venant's principle it is confined to the surroundings of the contact. It is drawn as
 //!
 //! ```text
 //! -n c (1 + r^2 / rho^2)^-3        rho^2 = 3/2 max(a^2, sum_i w_i r_i^2)
@@ -95,10 +94,10 @@ impl<'a> Indentation<'a> {
         let (mut moved, mut share) = (0.0, 0.0);
         for (node, weight) in corners {
             let distance = positions[node as usize].distance(point);
-            moved -= weight * (displacement(node) - load_displacement(body, node)).dot(normal);
+            moved -= weight * (displacement(node) - body.load_displacement(node as usize)).dot(normal);
             share += weight * profile(distance / width) * (body.green.free_axes(node as usize) * normal).dot(normal);
         }
-        // A triangle at a support, of which hardly anything can move.
+        // Nothing is added to a triangle that supports hold almost wholly.
         let amplitude = if share > 0.1 { (approach - moved) / share } else { 0.0 };
         Some(Self {
             point,
@@ -122,11 +121,6 @@ impl<'a> Indentation<'a> {
         }
         place - rest
     }
-}
-
-/// Displacement by the loads of a body, m.
-fn load_displacement(body: &BodyModel, node: u32) -> DVec3 {
-    DVec3::from_slice(&body.free[3 * node as usize..][..3])
 }
 
 /// `(1 + r^2)^-3`.

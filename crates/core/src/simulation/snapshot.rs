@@ -82,7 +82,7 @@ impl Snapshot {
 
     fn displacement_of(&self, model: &Model, body: usize, modal_beyond_static: &[Lanes], node: u32) -> DVec3 {
         let (fixed, first) = (&model.bodies[body], 3 * node as usize);
-        let mut sum = DVec3::from_slice(&fixed.free[first..first + 3]);
+        let mut sum = fixed.load_displacement(node as usize);
         for slot in self.contacts.on(body) {
             let compliance = self.contacts.patches[slot].compliance_at(&fixed.green, node as usize);
             sum += compliance * self.contacts.slots[slot].force / self.bodies[body].stiffness_scale;

@@ -489,6 +489,5 @@ fn surroundings(
 /// Displacement of the surface at a fan by the loads of a body, m.
 fn load_displacement(model: &Model, body: usize, fan: usize) -> DVec3 {
     let fixed = &model.bodies[body];
-    let first = fixed.local.as_ref().map_or(0, |own| 3 * own.smooth.fans()[fan].node as usize);
-    DVec3::from_slice(&fixed.free[first..first + 3])
+    fixed.load_displacement(fixed.local.as_ref().map_or(0, |own| own.smooth.fans()[fan].node as usize))
 }
