@@ -3,6 +3,7 @@
 use glam::{DMat3, DVec3};
 
 use super::half_space::{Fields, HalfSpace, Indentation, LocalBody, LocalTool};
+use super::near_edge::{evaluate_near_edge, share_of_cells};
 use super::wrench::{CellMemory, indent_shape, placed_shape};
 use crate::contact::footprint::PressedSurface;
 use crate::contact::local::{
@@ -75,6 +76,8 @@ pub struct LocalResponse {
     pub higher: HigherOrders,
     higher_at_guess: HigherOrders,
     series: Option<Blended<SERIES_FIELDS>>,
+    /// Part of these that counts, and its gradient by the position, 1/m: near an edge they fade out.
+    part_of_series: (f64, DVec3),
     scale: f64,
     /// Offset of the tool along the surface from above its contact, m, and its distance from the contact, m.
     pub offset: DVec3,
@@ -117,19 +120,30 @@ pub fn evaluate(
 ) -> Option<LocalResponse> {
     // Set again with each foot.
     weights.touchable = 1.0;
-    match body.pressed_surface {
-        Some(pressed) => evaluate_shape((body, pressed), tool, contact, guess, others, weights, cells),
-        None => evaluate_sphere(body, tool, contact, guess, others, weights),
-    }
+    let mut response = match (body.pressed_surface, body.edges) {
+        (Some(pressed), _) => evaluate_shape((body, pressed), tool, contact, guess, others, weights, cells),
+        (None, Some(edges)) => {
+            let share = share_of_cells(body.edges, contact.is_fading, guess.foot.triangle, guess.place);
+            if share.0 > 0.0 {
+                let at = (body, edges);
+                return evaluate_near_edge(at, tool, contact, guess, others, weights, cells, share);
+            }
+            evaluate_sphere(body, tool, contact, guess, others, weights)
+        }
+        (None, None) => evaluate_sphere(body, tool, contact, guess, others, weights),
+    }?;
+    response.find_force(tool, contact, guess.place, others);
+    Some(response)
 }
 
 /// A matrix scaled down to a bound of its norm. At an edge the normal of a footprint turns faster than its force does.
-fn bounded(matrix: DMat3, most: f64) -> DMat3 {
+pub(super) fn bounded(matrix: DMat3, most: f64) -> DMat3 {
     let size = matrix.to_cols_array().iter().map(|entry| entry * entry).sum::<f64>().sqrt();
     if size > most { matrix * (most / size) } else { matrix }
 }
 
-fn evaluate_sphere(
+/// The response of a sphere without its force.
+pub(super) fn evaluate_sphere(
     body: LocalBody<'_>,
     tool: LocalTool<'_>,
     contact: &LocalContact,
@@ -166,11 +180,11 @@ fn evaluate_sphere(
         response.slope += higher.slope;
         response.slope_by_force = compliance_slope(body, guess.force, &fields) + higher.slope_by_force;
     }
-    response.find_force(tool, contact, guess.place, others);
     Some(response)
 }
 
-fn evaluate_shape(
+/// The response of a tool on pressure cells without its force.
+pub(super) fn evaluate_shape(
     (body, pressed): (LocalBody<'_>, &PressedSurface),
     tool: LocalTool<'_>,
     contact: &LocalContact,
@@ -223,7 +237,6 @@ fn evaluate_shape(
     let mut response = LocalResponse::at(body, footprint.foot(place), &fields, indentation);
     response.point = place + indentation.lever;
     (response.slope, response.turn) = (slope(body, force, others, &fields), compliance_turns);
-    response.find_force(tool, contact, place, others);
     Some(response)
 }
 
@@ -310,6 +323,7 @@ impl LocalResponse {
             offset_by_position: DMat3::ZERO,
             offset_by_force: DMat3::ZERO,
             friction_by_position: DMat3::ZERO,
+            part_of_series: (1.0, DVec3::ZERO),
             ..Self::default()
         }
     }
@@ -322,7 +336,28 @@ impl LocalResponse {
     /// Higher orders of the body's displacement at a force, N.
     fn higher_orders_at(&self, force: DVec3) -> HigherOrders {
         let at = |series| higher_orders(series, (self.foot.normal, &self.foot.turning), force, self.scale);
-        self.series.as_ref().map_or_else(HigherOrders::default, at)
+        let whole = self.series.as_ref().map_or_else(HigherOrders::default, at);
+        let (part, gradient) = self.part_of_series;
+        if part == 1.0 { whole } else { whole.scaled(part, gradient) }
+    }
+
+    /// Whether the contact lies not below the tool, but where the whole energy is stationary.
+    fn turns(&self) -> bool {
+        self.series.is_some() && self.part_of_series.0 == 1.0
+    }
+
+    /// Their part in the slope, N.
+    pub(super) fn higher_slope(&self) -> DVec3 {
+        self.higher_at_guess.slope
+    }
+
+    /// Leaves a part of the higher orders of the body's displacement; its gradient by the position is given too, 1/m.
+    pub(super) fn reduce_series(&mut self, part: f64, gradient: DVec3) {
+        self.slope -= self.higher_at_guess.slope;
+        self.part_of_series = (part, gradient);
+        self.higher_at_guess = self.higher_at_guess.scaled(part, gradient);
+        self.slope += self.higher_at_guess.slope;
+        self.slope_by_force = DMat3::ZERO;
     }
 
     /// Finds the wrench that follows from the indentation, inclined by the gradients of the compliance and by the other contacts,
@@ -331,18 +366,12 @@ impl LocalResponse {
         let indentation = self.indentation;
         let whole = self.slope + others.slope;
         let slope = whole.clamp_length_max(STEEPEST_INCLINATION * indentation.force);
-        let push = match self.series {
-            Some(_) => self.turned_push(whole),
-            None => slope - indentation.gradient,
-        };
+        let push = if self.turns() { self.turned_push(whole) } else { slope - indentation.gradient };
         let pressing = push.length();
         if indentation.force == 0.0 || pressing == 0.0 {
             return;
         }
-        let lever = match self.series {
-            Some(_) => push * (-tool.radius / pressing),
-            None => indentation.lever,
-        };
+        let lever = if self.turns() { push * (-tool.radius / pressing) } else { indentation.lever };
         let rotation = rotation_vector(contact.previous_orientation, contact.orientation);
         let displacement = place - contact.relative_position + rotation.cross(lever);
         self.normal = push / pressing;
@@ -363,7 +392,7 @@ impl LocalResponse {
         self.friction_by_position =
             self.friction.by_displacement - outer(self.friction.by_pressing, n) * indentation.stiffness;
         self.jacobian = outer(n, n) * indentation.stiffness - turning * indentation.force + self.friction_by_position;
-        if self.series.is_some() {
+        if self.turns() {
             self.jacobian = self.turning * self.jacobian;
             self.offset_by_position = self.offset_by_force * self.jacobian;
         }

@@ -59,6 +59,8 @@ pub struct LocalScratch {
     /// The pieces next to the latest tool, and the slot of its contact.
     pub footprint: FootprintScratch,
     pub pressed_slot: Option<usize>,
+    /// Weights of the share of a sphere's contact that is on cells.
+    pub(super) edge_weights: FanWeights,
     /// Placeholder for contacts without cells.
     pub(super) no_pressures: PressureState,
 }
@@ -116,7 +118,7 @@ impl LocalScratch {
     fn residual(&self, count: usize) -> f64 {
         let of = |a: usize| {
             let moved: DVec3 = (0..count).map(|b| self.between[a][b] * self.responses[b].force).sum();
-            (self.positions[a] - self.free_positions[a] + moved).length()
+            (self.positions[a] - self.free_positions[a] + moved + self.responses[a].higher.displacement).length()
         };
         (0..count)
             .map(of)
@@ -224,6 +226,7 @@ impl LocalScratch {
             cells: Box::default(),
             footprint: FootprintScratch::default(),
             pressed_slot: None,
+            edge_weights: FanWeights::new(neighbourhood(model)),
             no_pressures: PressureState::default(),
         }
     }
@@ -240,6 +243,7 @@ pub fn local_body<'a>(model: &'a Model, state: &State, tool: usize, body: usize)
         fields: &regular.fields,
         series: regular.series.as_deref(),
         pressed_surface: model.pressed_surfaces[tool][body].as_deref(),
+        edges: model.edge_surfaces[tool][body].as_deref(),
         scale: state.bodies[body].stiffness_scale,
     })
 }

@@ -18,6 +18,7 @@ use super::foot_jumps::{
 };
 use super::force_error::{ForceError, Surroundings, estimate};
 use super::half_space::LocalTool;
+use super::near_edge::share_of_contact;
 use super::response::{Guess, LocalResponse, OtherContacts, evaluate};
 use super::scratch::{LocalScratch, TrustRegion, local_body};
 use super::wrench::{CellMemory, placed_shape};
@@ -77,7 +78,8 @@ fn local_tool<'a>(model: &'a Model, controls: &Controls, tool: usize) -> LocalTo
 
 /// Whether the contact in a slot needs pressure cells.
 fn contact_needs_cells(model: &Model, state: &State, slot: usize) -> bool {
-    model.tools[state.contacts.slots[slot].tool].shape.needs_cells()
+    let contact = &state.contacts.slots[slot];
+    model.tools[contact.tool].shape.needs_cells() || share_of_contact(model, contact) > 0.0
 }
 
 /// Resolution of cells: the more contacts need them, the coarser, so that a tick stays within its time.
@@ -324,11 +326,20 @@ fn evaluate_contacts(
         }
         let tool = state.contacts.slots[slot].tool;
         let response = local_body(model, state, tool, body).and_then(|surface| {
-            let LocalScratch { positions, responses, others, weights, cells, footprint, no_pressures, .. } =
-                &mut *local;
+            let LocalScratch {
+                positions,
+                responses,
+                others,
+                weights,
+                cells,
+                footprint,
+                no_pressures,
+                edge_weights,
+                ..
+            } = &mut *local;
             let contact = &state.contacts.slots[slot].local;
             let pressures = state.pressures.get_mut(slot).unwrap_or(no_pressures);
-            let cells = CellMemory { state: pressures, scratch: cells, footprint, resolution };
+            let cells = CellMemory { state: pressures, scratch: cells, footprint, resolution, edge_weights };
             let tool = local_tool(model, controls, tool);
             let LocalResponse { force, foot, offset, friction, .. } = &responses[a];
             let (force, friction) = (*force, friction.force);
@@ -338,7 +349,7 @@ fn evaluate_contacts(
         match response {
             Some(response) => {
                 local.responses[a] = response;
-                local.pressed_slot = contact_needs_cells(model, state, slot).then_some(slot);
+                local.pressed_slot = model.tools[tool].shape.needs_cells().then_some(slot);
             }
             None => {
                 if local.weights[a].is_outside() {

@@ -18,6 +18,7 @@ use crate::contact::footprint::{Footprint, FootprintScratch, NearPieces, NearRel
 use crate::contact::local::cells::{CellProblem, CellScratch, PressureState, Resolution};
 use crate::contact::local::{ContactPlane, ToolPose};
 use crate::contact::shape::ToolShape;
+use crate::contact::smooth::FanWeights;
 use crate::simulation::contacts::LocalContact;
 
 /// State and memory of pressure cells, and their resolution.
@@ -27,6 +28,8 @@ pub struct CellMemory<'a> {
     pub scratch: &'a mut CellScratch,
     pub footprint: &'a mut FootprintScratch,
     pub resolution: Resolution,
+    /// Weights of the fans for a share of a sphere's contact.
+    pub edge_weights: &'a mut FanWeights,
 }
 
 /// The shape of a tool as it is pressed: lifted by the approach at which the contact began.
@@ -159,6 +162,7 @@ mod tests {
                 fields: &self.fields,
                 series: None,
                 pressed_surface: Some(&pressed),
+                edges: None,
                 scale: 1.0,
             };
             let tool = LocalTool { shape, radius: shape.bounding_radius(), pad: None, coefficient: 0.0 };
@@ -166,6 +170,7 @@ mod tests {
             let mut weights = FanWeights::new(near(&self.smooth));
             let (mut state, mut scratch) = (PressureState::default(), CellScratch::default());
             let mut footprint = FootprintScratch::default();
+            let mut edge_weights = weights.clone();
             let at = PlacedShape { contact_normal: DVec3::ZERO, ..placed_shape(shape, &contact, place) };
             footprint.near.find(&pressed, &self.query, &at);
             let first = footprint.first_touched(DVec3::ZERO).expect("a piece");
@@ -181,8 +186,13 @@ mod tests {
                     offset: DVec3::ZERO,
                 };
                 let resolution = Resolution::Medium;
-                let cells =
-                    CellMemory { state: &mut state, scratch: &mut scratch, footprint: &mut footprint, resolution };
+                let cells = CellMemory {
+                    state: &mut state,
+                    scratch: &mut scratch,
+                    footprint: &mut footprint,
+                    resolution,
+                    edge_weights: &mut edge_weights,
+                };
                 let others = OtherContacts::default();
                 response = evaluate(body, tool, &contact, guess, others, &mut weights, cells).expect("an answer");
                 (contact.foot, contact.penetration) = (response.foot, response.indentation.depth);

@@ -1,0 +1,119 @@
+//! A sphere near a sharp convex edge: partly the closed form, partly pressure cells (`contact::EdgeSurface`).
+//!
+//! With the share `s(p')` of cells the energies of the half-space and of the body are means,
+//!
+//! ```text
+//! Phi = (1 - s) Phi_sphere + s Phi_cells        C = (1 - s) C_sphere + s C_cells
+//! ```
+//!
+//! so that forces, the terms from `ds/dp'` included, are the gradient of one energy.
+
+use glam::{DMat3, DQuat, DVec3};
+
+use super::half_space::{Indentation, LocalBody, LocalTool};
+use super::response::{Guess, LocalResponse, OtherContacts, bounded, evaluate_shape, evaluate_sphere};
+use super::wrench::CellMemory;
+use crate::contact::EdgeSurface;
+use crate::contact::smooth::{FanWeights, FootPoint};
+use crate::simulation::contacts::{Contact, LocalContact};
+use crate::simulation::model::Model;
+
+/// Axes of the cells under a sphere, which has none of its own: along no direction that bodies are likely to have.
+const AXES: DQuat = DQuat::from_xyzw(0.22, 0.41, 0.13, 0.875_385_629_654_298_5);
+
+/// Share of cells in a contact, and its gradient by the position, 1/m. A contact that fades stays as it is on its plane.
+pub fn share_of_cells(edges: Option<&EdgeSurface>, is_fading: bool, triangle: u32, position: DVec3) -> (f64, DVec3) {
+    edges.filter(|_| !is_fading).map_or((0.0, DVec3::ZERO), |edges| edges.share(triangle, position))
+}
+
+/// Share of cells in a contact of a sphere as of the last tick.
+pub fn share_of_contact(model: &Model, contact: &Contact) -> f64 {
+    let (edges, local) = (model.edge_surfaces[contact.tool][contact.body].as_deref(), &contact.local);
+    share_of_cells(edges, local.is_fading, local.foot.triangle, local.relative_position).0
+}
+
+/// Evaluates the response of a sphere of which a share is on cells. `None` where the body is not touchable.
+pub fn evaluate_near_edge(
+    (body, edges): (LocalBody<'_>, &EdgeSurface),
+    tool: LocalTool<'_>,
+    contact: &LocalContact,
+    guess: Guess<'_>,
+    others: OtherContacts,
+    weights: &mut FanWeights,
+    cells: CellMemory<'_>,
+    (share, gradient): (f64, DVec3),
+) -> Option<LocalResponse> {
+    let CellMemory { state, scratch, footprint, resolution, edge_weights } = cells;
+    let turned = LocalContact { orientation: AXES, ..*contact };
+    let mut at_edge = |weights: &mut FanWeights, unused: &mut FanWeights| {
+        let cells = CellMemory { state, scratch, footprint, resolution, edge_weights: unused };
+        let mut response = evaluate_shape((body, &edges.pressed), tool, &turned, guess, others, weights, cells)?;
+        // A sphere that turns stays the same.
+        (response.indentation.torque, response.turn) = (DVec3::ZERO, DVec3::ZERO);
+        response.foot.turning = bounded(response.foot.turning, 1.0 / tool.radius);
+        if contact.is_new {
+            response.indentation = Indentation::default();
+        }
+        Some(response)
+    };
+    if share == 1.0 {
+        let mut response = at_edge(weights, edge_weights)?;
+        response.find_force(tool, contact, guess.place, others);
+        return Some(response);
+    }
+    let guess = Guess { offset: DVec3::ZERO, ..guess };
+    let mut sphere = evaluate_sphere(body, tool, contact, guess, others, weights)?;
+    sphere.reduce_series(1.0 - share, -gradient);
+    edge_weights.touchable = 1.0;
+    let Some(at_edge) = at_edge(edge_weights, weights) else {
+        weights.touchable = edge_weights.touchable;
+        return None;
+    };
+    let mut response = sphere.mixed(&at_edge, (share, gradient), guess.force);
+    weights.mix(edge_weights, share, gradient);
+    response.find_force(tool, contact, guess.place, others);
+    Some(response)
+}
+
+impl LocalResponse {
+    /// The mean of two responses without their forces, of which the other has a share.
+    fn mixed(&self, other: &Self, (share, gradient): (f64, DVec3), force: DVec3) -> Self {
+        let softer = other.compliance - self.compliance;
+        let mut mixed = *self;
+        mixed.foot = mixed_foot(&self.foot, &other.foot, share);
+        mixed.compliance = self.compliance + softer * share;
+        mixed.indentation = mixed_indentation(&self.indentation, &other.indentation, (share, gradient));
+        // The higher orders have been reduced already.
+        let higher = self.higher_slope();
+        mixed.slope =
+            (self.slope - higher).lerp(other.slope, share) + higher + gradient * (0.5 * force.dot(softer * force));
+        (mixed.normal, mixed.point) = (mixed.foot.normal, self.point.lerp(other.point, share));
+        mixed
+    }
+}
+
+fn mixed_foot(sphere: &FootPoint, at_edge: &FootPoint, share: f64) -> FootPoint {
+    let mean = |one: DMat3, other: DMat3| one * (1.0 - share) + other * share;
+    FootPoint {
+        position: sphere.position.lerp(at_edge.position, share),
+        normal: sphere.normal.lerp(at_edge.normal, share).normalize_or(sphere.normal),
+        distance: sphere.distance + share * (at_edge.distance - sphere.distance),
+        turning: mean(sphere.turning, at_edge.turning),
+        shift: mean(sphere.shift, at_edge.shift),
+        ..*sphere
+    }
+}
+
+fn mixed_indentation(sphere: &Indentation, at_edge: &Indentation, (share, gradient): (f64, DVec3)) -> Indentation {
+    let mean = |one: f64, other: f64| one + share * (other - one);
+    Indentation {
+        depth: mean(sphere.depth, at_edge.depth),
+        force: mean(sphere.force, at_edge.force),
+        radius: mean(sphere.radius, at_edge.radius),
+        stiffness: mean(sphere.stiffness, at_edge.stiffness),
+        energy: mean(sphere.energy, at_edge.energy),
+        gradient: sphere.gradient.lerp(at_edge.gradient, share) + gradient * (at_edge.energy - sphere.energy),
+        lever: sphere.lever.lerp(at_edge.lever, share),
+        ..*sphere
+    }
+}
