@@ -16,9 +16,8 @@ use crate::memory::Ranges;
 use crate::mesh::Surface;
 
 /// Distances of the sphere's centre from an edge, over its radius, up to which its contact is all on cells, and from which it has
-/// none. A shallow contact lies then 0.75 and 1.4 radii beside the edge: there a half-space is within 1 % of the body, and cells
-/// within 0.3 % of the closed form.
-const NEAR: [f64; 2] = [1.25, 1.7];
+/// none. A shallow contact lies then 0.5 and 0.9 radii beside the edge, where a half-space is 8 and 1 % harder than the body.
+const NEAR: [f64; 2] = [1.12, 1.35];
 /// Edges up to this distance from a triangle, over the radius, are listed for it: the sphere's centre may lie as deep below the
 /// triangle as it is far from the edge.
 const LISTED: f64 = 2.0 * NEAR[1];

@@ -61,20 +61,6 @@ pub struct HigherOrders {
     pub fraction: f64,
 }
 
-impl HigherOrders {
-    /// A part of them, with its gradient by the tool's position, 1/m.
-    pub fn scaled(&self, part: f64, gradient: DVec3) -> Self {
-        Self {
-            displacement: self.displacement * part,
-            compliance: self.compliance * part,
-            energy: self.energy * part,
-            slope: self.slope * part + gradient * self.energy,
-            slope_by_force: self.slope_by_force * part,
-            fraction: self.fraction * part,
-        }
-    }
-}
-
 impl Default for HigherOrders {
     fn default() -> Self {
         // A matrix is the identity by default.

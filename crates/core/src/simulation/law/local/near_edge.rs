@@ -22,7 +22,7 @@ use crate::simulation::model::Model;
 const AXES: DQuat = DQuat::from_xyzw(0.22, 0.41, 0.13, 0.875_385_629_654_298_5);
 
 /// Share of cells in a contact, and its gradient by the position, 1/m. A contact that fades stays as it is on its plane.
-pub fn share_of_cells(edges: Option<&EdgeSurface>, is_fading: bool, triangle: u32, position: DVec3) -> (f64, DVec3) {
+fn share_of_cells(edges: Option<&EdgeSurface>, is_fading: bool, triangle: u32, position: DVec3) -> (f64, DVec3) {
     edges.filter(|_| !is_fading).map_or((0.0, DVec3::ZERO), |edges| edges.share(triangle, position))
 }
 
@@ -32,16 +32,48 @@ pub fn share_of_contact(model: &Model, contact: &Contact) -> f64 {
     share_of_cells(edges, local.is_fading, local.foot.triangle, local.relative_position).0
 }
 
-/// Evaluates the response of a sphere of which a share is on cells. `None` where the body is not touchable.
-pub fn evaluate_near_edge(
-    (body, edges): (LocalBody<'_>, &EdgeSurface),
+/// Whether a contact needs pressure cells.
+pub fn contact_needs_cells(model: &Model, contact: &Contact) -> bool {
+    model.tools[contact.tool].shape.needs_cells() || share_of_contact(model, contact) > 0.0
+}
+
+/// Evaluates the response to the tool at a position. `None` where the body is not touchable.
+pub fn evaluate(
+    body: LocalBody<'_>,
     tool: LocalTool<'_>,
     contact: &LocalContact,
     guess: Guess<'_>,
     others: OtherContacts,
     weights: &mut FanWeights,
     cells: CellMemory<'_>,
-    (share, gradient): (f64, DVec3),
+) -> Option<LocalResponse> {
+    // Set again with each foot.
+    weights.touchable = 1.0;
+    let mut response = match (body.pressed_surface, body.edges) {
+        (Some(pressed), _) => evaluate_shape((body, pressed), tool, contact, guess, others, weights, cells),
+        (None, Some(edges)) => {
+            let share = share_of_cells(body.edges, contact.is_fading, guess.foot.triangle, guess.place);
+            if share.0 > 0.0 {
+                let at = (body, edges, share);
+                return evaluate_near_edge(at, tool, contact, guess, others, weights, cells);
+            }
+            evaluate_sphere(body, tool, contact, guess, others, weights)
+        }
+        (None, None) => evaluate_sphere(body, tool, contact, guess, others, weights),
+    }?;
+    response.find_force(tool, contact, guess.place, others);
+    Some(response)
+}
+
+/// Evaluates the response of a sphere of which a share is on cells. `None` where the body is not touchable.
+fn evaluate_near_edge(
+    (body, edges, (share, gradient)): (LocalBody<'_>, &EdgeSurface, (f64, DVec3)),
+    tool: LocalTool<'_>,
+    contact: &LocalContact,
+    guess: Guess<'_>,
+    others: OtherContacts,
+    weights: &mut FanWeights,
+    cells: CellMemory<'_>,
 ) -> Option<LocalResponse> {
     let CellMemory { state, scratch, footprint, resolution, edge_weights } = cells;
     let turned = LocalContact { orientation: AXES, ..*contact };
@@ -58,12 +90,11 @@ pub fn evaluate_near_edge(
     };
     if share == 1.0 {
         let mut response = at_edge(weights, edge_weights)?;
+        response.set_series(body, weights, guess, 0.0);
         response.find_force(tool, contact, guess.place, others);
         return Some(response);
     }
-    let guess = Guess { offset: DVec3::ZERO, ..guess };
-    let mut sphere = evaluate_sphere(body, tool, contact, guess, others, weights)?;
-    sphere.reduce_series(1.0 - share, -gradient);
+    let sphere = evaluate_sphere(body, tool, contact, guess, others, weights)?;
     edge_weights.touchable = 1.0;
     let Some(at_edge) = at_edge(edge_weights, weights) else {
         weights.touchable = edge_weights.touchable;
@@ -71,6 +102,7 @@ pub fn evaluate_near_edge(
     };
     let mut response = sphere.mixed(&at_edge, (share, gradient), guess.force);
     weights.mix(edge_weights, share, gradient);
+    response.set_series(body, weights, guess, 1.0 - share);
     response.find_force(tool, contact, guess.place, others);
     Some(response)
 }
@@ -83,10 +115,10 @@ impl LocalResponse {
         mixed.foot = mixed_foot(&self.foot, &other.foot, share);
         mixed.compliance = self.compliance + softer * share;
         mixed.indentation = mixed_indentation(&self.indentation, &other.indentation, (share, gradient));
-        // The higher orders have been reduced already.
-        let higher = self.higher_slope();
-        mixed.slope =
-            (self.slope - higher).lerp(other.slope, share) + higher + gradient * (0.5 * force.dot(softer * force));
+        // Higher orders are added with the mean weights.
+        mixed.slope = self.slope - self.linear_slope()
+            + self.linear_slope().lerp(other.slope, share)
+            + gradient * (0.5 * force.dot(softer * force));
         (mixed.normal, mixed.point) = (mixed.foot.normal, self.point.lerp(other.point, share));
         mixed
     }

@@ -3,7 +3,6 @@
 use glam::{DMat3, DVec3};
 
 use super::half_space::{Fields, HalfSpace, Indentation, LocalBody, LocalTool};
-use super::near_edge::{evaluate_near_edge, share_of_cells};
 use super::wrench::{CellMemory, indent_shape, placed_shape};
 use crate::contact::footprint::PressedSurface;
 use crate::contact::local::{
@@ -76,8 +75,8 @@ pub struct LocalResponse {
     pub higher: HigherOrders,
     higher_at_guess: HigherOrders,
     series: Option<Blended<SERIES_FIELDS>>,
-    /// Part of these that counts, and its gradient by the position, 1/m: near an edge they fade out.
-    part_of_series: (f64, DVec3),
+    /// Part to which the contact is turned by these (`turned_push`).
+    turned_part: f64,
     scale: f64,
     /// Offset of the tool along the surface from above its contact, m, and its distance from the contact, m.
     pub offset: DVec3,
@@ -106,34 +105,6 @@ pub struct Guess<'a> {
     pub foot: &'a FootPoint,
     /// Offset of the tool from above it, m.
     pub offset: DVec3,
-}
-
-/// Evaluates the response to the tool at a position. `None` where the body is not touchable.
-pub fn evaluate(
-    body: LocalBody<'_>,
-    tool: LocalTool<'_>,
-    contact: &LocalContact,
-    guess: Guess<'_>,
-    others: OtherContacts,
-    weights: &mut FanWeights,
-    cells: CellMemory<'_>,
-) -> Option<LocalResponse> {
-    // Set again with each foot.
-    weights.touchable = 1.0;
-    let mut response = match (body.pressed_surface, body.edges) {
-        (Some(pressed), _) => evaluate_shape((body, pressed), tool, contact, guess, others, weights, cells),
-        (None, Some(edges)) => {
-            let share = share_of_cells(body.edges, contact.is_fading, guess.foot.triangle, guess.place);
-            if share.0 > 0.0 {
-                let at = (body, edges);
-                return evaluate_near_edge(at, tool, contact, guess, others, weights, cells, share);
-            }
-            evaluate_sphere(body, tool, contact, guess, others, weights)
-        }
-        (None, None) => evaluate_sphere(body, tool, contact, guess, others, weights),
-    }?;
-    response.find_force(tool, contact, guess.place, others);
-    Some(response)
 }
 
 /// A matrix scaled down to a bound of its norm. At an edge the normal of a footprint turns faster than its force does.
@@ -323,7 +294,7 @@ impl LocalResponse {
             offset_by_position: DMat3::ZERO,
             offset_by_force: DMat3::ZERO,
             friction_by_position: DMat3::ZERO,
-            part_of_series: (1.0, DVec3::ZERO),
+            turned_part: 1.0,
             ..Self::default()
         }
     }
@@ -336,28 +307,25 @@ impl LocalResponse {
     /// Higher orders of the body's displacement at a force, N.
     fn higher_orders_at(&self, force: DVec3) -> HigherOrders {
         let at = |series| higher_orders(series, (self.foot.normal, &self.foot.turning), force, self.scale);
-        let whole = self.series.as_ref().map_or_else(HigherOrders::default, at);
-        let (part, gradient) = self.part_of_series;
-        if part == 1.0 { whole } else { whole.scaled(part, gradient) }
+        self.series.as_ref().map_or_else(HigherOrders::default, at)
     }
 
-    /// Whether the contact lies not below the tool, but where the whole energy is stationary.
-    fn turns(&self) -> bool {
-        self.series.is_some() && self.part_of_series.0 == 1.0
-    }
-
-    /// Their part in the slope, N.
-    pub(super) fn higher_slope(&self) -> DVec3 {
-        self.higher_at_guess.slope
-    }
-
-    /// Leaves a part of the higher orders of the body's displacement; its gradient by the position is given too, 1/m.
-    pub(super) fn reduce_series(&mut self, part: f64, gradient: DVec3) {
+    /// Takes the higher orders of the body's displacement with other weights of the fans. The contact is turned by a part only:
+    /// on cells the force follows from the gradient of the energy.
+    pub(super) fn set_series(&mut self, body: LocalBody<'_>, weights: &FanWeights, guess: Guess<'_>, turned_part: f64) {
+        let Some(series) = body.series else { return };
         self.slope -= self.higher_at_guess.slope;
-        self.part_of_series = (part, gradient);
-        self.higher_at_guess = self.higher_at_guess.scaled(part, gradient);
+        (self.series, self.turned_part) = (Some(weights.blend(series)), turned_part);
+        self.guess = ForceGuess { force: guess.force, friction: guess.friction, offset: guess.offset };
+        self.higher_at_guess = self.higher_orders_at(guess.force);
         self.slope += self.higher_at_guess.slope;
-        self.slope_by_force = DMat3::ZERO;
+        let linear = compliance_slope(body, guess.force, &weights.blend(body.fields));
+        self.slope_by_force = linear + self.higher_at_guess.slope_by_force;
+    }
+
+    /// Slope without the part of the higher orders, N.
+    pub(super) fn linear_slope(&self) -> DVec3 {
+        self.slope - self.higher_at_guess.slope
     }
 
     /// Finds the wrench that follows from the indentation, inclined by the gradients of the compliance and by the other contacts,
@@ -366,12 +334,16 @@ impl LocalResponse {
         let indentation = self.indentation;
         let whole = self.slope + others.slope;
         let slope = whole.clamp_length_max(STEEPEST_INCLINATION * indentation.force);
-        let push = if self.turns() { self.turned_push(whole) } else { slope - indentation.gradient };
+        let part = if self.series.is_some() { self.turned_part } else { 0.0 };
+        let mut push = slope - indentation.gradient;
+        if part > 0.0 {
+            push = push.lerp(self.turned_push(whole), part);
+        }
         let pressing = push.length();
         if indentation.force == 0.0 || pressing == 0.0 {
             return;
         }
-        let lever = if self.turns() { push * (-tool.radius / pressing) } else { indentation.lever };
+        let lever = if part > 0.0 { push * (-tool.radius / pressing) } else { indentation.lever };
         let rotation = rotation_vector(contact.previous_orientation, contact.orientation);
         let displacement = place - contact.relative_position + rotation.cross(lever);
         self.normal = push / pressing;
@@ -392,8 +364,9 @@ impl LocalResponse {
         self.friction_by_position =
             self.friction.by_displacement - outer(self.friction.by_pressing, n) * indentation.stiffness;
         self.jacobian = outer(n, n) * indentation.stiffness - turning * indentation.force + self.friction_by_position;
-        if self.turns() {
-            self.jacobian = self.turning * self.jacobian;
+        if part > 0.0 {
+            (self.offset, self.offset_by_force) = (self.offset * part, self.offset_by_force * part);
+            self.jacobian = (DMat3::IDENTITY * (1.0 - part) + self.turning * part) * self.jacobian;
             self.offset_by_position = self.offset_by_force * self.jacobian;
         }
         let share = if whole == DVec3::ZERO { 1.0 } else { slope.length() / whole.length() };
@@ -443,7 +416,7 @@ impl LocalResponse {
 
     /// Derivative of the body's displacement by the position at constant force: the contact moves along the surface.
     pub fn displacement_by_position(&self) -> DMat3 {
-        self.slope_by_force.transpose() * (DMat3::IDENTITY - self.offset_by_position)
+        self.slope_by_force.transpose() * (DMat3::IDENTITY - self.offset_by_position) * self.turned_part
     }
 
     /// The springs of friction; without a force none is stretched.

@@ -18,8 +18,8 @@ use super::foot_jumps::{
 };
 use super::force_error::{ForceError, Surroundings, estimate};
 use super::half_space::LocalTool;
-use super::near_edge::share_of_contact;
-use super::response::{Guess, LocalResponse, OtherContacts, evaluate};
+use super::near_edge::{contact_needs_cells, evaluate};
+use super::response::{Guess, LocalResponse, OtherContacts};
 use super::scratch::{LocalScratch, TrustRegion, local_body};
 use super::wrench::{CellMemory, placed_shape};
 use crate::contact::local::FrictionResponse;
@@ -76,17 +76,11 @@ fn local_tool<'a>(model: &'a Model, controls: &Controls, tool: usize) -> LocalTo
     }
 }
 
-/// Whether the contact in a slot needs pressure cells.
-fn contact_needs_cells(model: &Model, state: &State, slot: usize) -> bool {
-    let contact = &state.contacts.slots[slot];
-    model.tools[contact.tool].shape.needs_cells() || share_of_contact(model, contact) > 0.0
-}
-
 /// Resolution of cells: the more contacts need them, the coarser, so that a tick stays within its time.
 fn resolution(model: &Model, state: &State) -> Resolution {
     let slots = &state.contacts.slots;
     let local = |slot: usize| slots[slot].mode != Mode::Free && slots[slot].law == LawKind::LOCAL;
-    match (0..MAX_CONTACTS).filter(|&slot| local(slot) && contact_needs_cells(model, state, slot)).count() {
+    match (0..MAX_CONTACTS).filter(|&slot| local(slot) && contact_needs_cells(model, &slots[slot])).count() {
         0 | 1 => Resolution::Fine,
         2..=4 => Resolution::Medium,
         _ => Resolution::Coarse,
@@ -177,7 +171,7 @@ fn solve_equations(
         local.responses[a].friction =
             FrictionResponse { force: contact.local.friction.force(), ..FrictionResponse::default() };
     }
-    let cells = slots.iter().any(|&slot| contact_needs_cells(model, state, slot));
+    let cells = slots.iter().any(|&slot| contact_needs_cells(model, &state.contacts.slots[slot]));
     let (most, [step_factor, force_factor]) =
         if cells { (MOST_CELL_STEPS, CELL_TOLERANCES) } else { (MOST_STEPS, [1.0; 2]) };
     let tool = &model.tools[state.contacts.slots[slots[0]].tool];
@@ -321,7 +315,7 @@ fn evaluate_contacts(
     let mut guessed = [DVec3::ZERO; MAX_CONTACTS];
     for (a, &slot) in slots.iter().enumerate() {
         guessed[a] = local.responses[a].force;
-        if contact_needs_cells(model, state, slot) {
+        if contact_needs_cells(model, &state.contacts.slots[slot]) {
             local.footprint.others = other_planes(&state.contacts, slot);
         }
         let tool = state.contacts.slots[slot].tool;

@@ -127,7 +127,8 @@ mod tests {
     use crate::contact::smooth::{DrawnSurface, FanWeights, SmoothSurface};
     use crate::mesh::Surface;
     use crate::simulation::law::local::half_space::LocalBody;
-    use crate::simulation::law::local::response::{Guess, LocalResponse, OtherContacts, evaluate};
+    use crate::simulation::law::local::near_edge::evaluate;
+    use crate::simulation::law::local::response::{Guess, LocalResponse, OtherContacts};
 
     /// A body whose modulus rises by a half over a length of two.
     struct Body {
