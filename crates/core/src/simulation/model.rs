@@ -7,7 +7,7 @@ use super::tool::ToolModel;
 use super::{MAX_BODIES, MAX_TOOLS};
 use crate::contact::footprint::PressedSurface;
 use crate::contact::shape::ToolShape;
-use crate::contact::{CompliantBody, Concavities, EdgeSurface, RegularCompliance};
+use crate::contact::{CompliantBody, Concavities, CornerSurface, RegularCompliance};
 use crate::memory::Ranges;
 use crate::{Error, Result};
 
@@ -21,8 +21,8 @@ pub struct Model {
     pub(super) regular_compliances: Vec<Vec<Option<Arc<RegularCompliance>>>>,
     /// By tool and body, for such tools that are not spheres: the surface divided into pieces.
     pub(super) pressed_surfaces: Vec<Vec<Option<Arc<PressedSurface>>>>,
-    /// By tool and body, for spheres: the sharp convex edges of the surface, where it has any.
-    pub(super) edge_surfaces: Vec<Vec<Option<Arc<EdgeSurface>>>>,
+    /// By tool and body, for spheres: the sharp convex corners of the surface, where it has any.
+    pub(super) corner_surfaces: Vec<Vec<Option<Arc<CornerSurface>>>>,
     /// By tool and body, for spheres: where the tool may touch at several places.
     pub(super) concavities: Vec<Vec<Concavities>>,
 }
@@ -38,7 +38,7 @@ impl Model {
             compliance.series.iter().for_each(|series| ranges.add(series));
         }
         self.pressed_surfaces.iter().flatten().flatten().for_each(|surface| surface.add_memory(&mut ranges));
-        self.edge_surfaces.iter().flatten().flatten().for_each(|surface| surface.add_memory(&mut ranges));
+        self.corner_surfaces.iter().flatten().flatten().for_each(|surface| surface.add_memory(&mut ranges));
         self.concavities.iter().flatten().for_each(|concavities| concavities.add_memory(&mut ranges));
         ranges
     }
@@ -46,7 +46,7 @@ impl Model {
     /// Whether any contact may need pressure cells.
     pub(super) fn needs_cells(&self) -> bool {
         self.pressed_surfaces.iter().flatten().any(Option::is_some)
-            || self.edge_surfaces.iter().flatten().any(Option::is_some)
+            || self.corner_surfaces.iter().flatten().any(Option::is_some)
     }
 
     /// Prepares bodies and tools.
@@ -103,12 +103,12 @@ impl Model {
             regular_compliances[rank].iter().map(Option::as_deref).zip(&bodies).map(of_body).collect()
         };
         let pressed_surfaces = tools.iter().enumerate().map(pressed_of_tool).collect();
-        let edges_of_tool = |(rank, tool): (usize, &ToolModel)| {
-            let of_body = |(compliance, body)| edge_surface(body, tool, compliance);
+        let corners_of_tool = |(rank, tool): (usize, &ToolModel)| {
+            let of_body = |(compliance, body)| corner_surface(body, tool, compliance);
             regular_compliances[rank].iter().map(Option::as_deref).zip(&bodies).map(of_body).collect()
         };
-        let edge_surfaces = tools.iter().enumerate().map(edges_of_tool).collect();
-        Ok(Self { bodies, tools, regular_compliances, pressed_surfaces, edge_surfaces, concavities })
+        let corner_surfaces = tools.iter().enumerate().map(corners_of_tool).collect();
+        Ok(Self { bodies, tools, regular_compliances, pressed_surfaces, corner_surfaces, concavities })
     }
 
     /// The regular compliance of such a tool and body, if this model has it.
@@ -145,16 +145,16 @@ fn pressed_surface(
     Some(Arc::new(PressedSurface::new(&body.loaded, &body.query, &local.smooth, &compliance.fields, thickness)))
 }
 
-fn edge_surface(
+fn corner_surface(
     body: &BodyModel,
     tool: &ToolModel,
     compliance: Option<&RegularCompliance>,
-) -> Option<Arc<EdgeSurface>> {
+) -> Option<Arc<CornerSurface>> {
     let (local, compliance) = (body.local.as_ref()?, compliance?);
     let ToolShape::Sphere { radius } = tool.shape else { return None };
     let (surface, query, smooth) = (&body.loaded, &body.query, &local.smooth);
     let pressed = || PressedSurface::new(surface, query, smooth, &compliance.fields, radius);
-    EdgeSurface::new((surface, query, smooth), radius, pressed).map(Arc::new)
+    CornerSurface::new((surface, query, smooth), radius, pressed).map(Arc::new)
 }
 
 fn regular_compliance(body: &BodyModel, tool: &ToolModel) -> Result<Option<Arc<RegularCompliance>>> {

@@ -17,14 +17,14 @@ use super::MAX_CONTACTS;
 use super::rotation::rotation_vector;
 
 /// Tolerated surplus over the largest stored energy, and the surplus to which a larger one is reduced.
-const TOLERANCE: f64 = 8e-4;
+const TOLERANCE: f64 = 9e-4;
 const TARGET: f64 = 0.9 * TOLERANCE;
 /// A surplus below the first part of the largest energy reduces the approach by no more than the second part in a tick: a larger
 /// reduction could be felt as a jump.
 const SMALL_SURPLUS: f64 = 0.05;
 const LARGEST_SMALL_STEP: f64 = 0.01;
 /// Ticks over which a surplus decays: rounding would add up over minutes of motion on closed paths.
-const DECAY_TICKS: f64 = 10_000.0;
+const DECAY_TICKS: f64 = 1000.0;
 /// Longest motion in a tick, over the tool's radius, for which the work is known: to half the change of the force times the
 /// motion.
 const LONGEST_MOTION: f64 = 0.1;

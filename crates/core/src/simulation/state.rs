@@ -62,7 +62,7 @@ pub struct State {
     pub tools: [ToolState; MAX_TOOLS],
     /// The contacts.
     pub contacts: Contacts,
-    /// Pressures of each contact, for tools and edges without a closed form; empty if there are none.
+    /// Pressures of each contact, for tools and corners without a closed form; empty if there are none.
     pub(super) pressures: Vec<PressureState>,
     /// Static compliance between the contacts in two slots, at the Green's function's own Young's modulus, m/N.
     pub(super) compliance: Box<[[DMat3; MAX_CONTACTS]; MAX_CONTACTS]>,

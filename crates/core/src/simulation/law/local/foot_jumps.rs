@@ -11,7 +11,7 @@ use glam::{DMat3, DVec3};
 
 use super::add_contact;
 use super::depth_below;
-use super::near_edge::share_of_contact;
+use super::near_corner::share_of_contact;
 use super::response::LocalResponse;
 use crate::contact::shape::ToolShape;
 use crate::contact::smooth::FootPoint;

@@ -60,7 +60,7 @@ pub struct LocalScratch {
     pub footprint: FootprintScratch,
     pub pressed_slot: Option<usize>,
     /// Weights of the share of a sphere's contact that is on cells.
-    pub(super) edge_weights: FanWeights,
+    pub(super) corner_weights: FanWeights,
     /// Placeholder for contacts without cells.
     pub(super) no_pressures: PressureState,
 }
@@ -226,7 +226,7 @@ impl LocalScratch {
             cells: Box::default(),
             footprint: FootprintScratch::default(),
             pressed_slot: None,
-            edge_weights: FanWeights::new(neighbourhood(model)),
+            corner_weights: FanWeights::new(neighbourhood(model)),
             no_pressures: PressureState::default(),
         }
     }
@@ -243,7 +243,7 @@ pub fn local_body<'a>(model: &'a Model, state: &State, tool: usize, body: usize)
         fields: &regular.fields,
         series: regular.series.as_deref(),
         pressed_surface: model.pressed_surfaces[tool][body].as_deref(),
-        edges: model.edge_surfaces[tool][body].as_deref(),
+        corners: model.corner_surfaces[tool][body].as_deref(),
         scale: state.bodies[body].stiffness_scale,
     })
 }

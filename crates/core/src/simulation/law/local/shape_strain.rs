@@ -1,4 +1,4 @@
-//! Correction for finite strain below an ellipsoid, and below a sphere near an edge.
+//! Correction for finite strain below an ellipsoid, and below a sphere near a corner.
 //!
 //! Pressure cells give the energy `U` of a linear half-space. A sphere of radius `L` stores `U = 8/15 E* L^3 s^5`, `s = sqrt(d/L)`
 //! (Hertz), and beyond small strain (`contact::local::finite_strain`)

@@ -18,7 +18,7 @@ use super::foot_jumps::{
 };
 use super::force_error::{ForceError, Surroundings, estimate};
 use super::half_space::LocalTool;
-use super::near_edge::{contact_needs_cells, evaluate};
+use super::near_corner::{contact_needs_cells, evaluate};
 use super::response::{Guess, LocalResponse, OtherContacts};
 use super::scratch::{LocalScratch, TrustRegion, local_body};
 use super::wrench::{CellMemory, placed_shape};
@@ -328,12 +328,12 @@ fn evaluate_contacts(
                 cells,
                 footprint,
                 no_pressures,
-                edge_weights,
+                corner_weights,
                 ..
             } = &mut *local;
             let contact = &state.contacts.slots[slot].local;
             let pressures = state.pressures.get_mut(slot).unwrap_or(no_pressures);
-            let cells = CellMemory { state: pressures, scratch: cells, footprint, resolution, edge_weights };
+            let cells = CellMemory { state: pressures, scratch: cells, footprint, resolution, corner_weights };
             let tool = local_tool(model, controls, tool);
             let LocalResponse { force, foot, offset, friction, .. } = &responses[a];
             let (force, friction) = (*force, friction.force);

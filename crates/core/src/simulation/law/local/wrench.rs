@@ -29,7 +29,7 @@ pub struct CellMemory<'a> {
     pub footprint: &'a mut FootprintScratch,
     pub resolution: Resolution,
     /// Weights of the fans for a share of a sphere's contact.
-    pub edge_weights: &'a mut FanWeights,
+    pub corner_weights: &'a mut FanWeights,
 }
 
 /// The shape of a tool as it is pressed: lifted by the approach at which the contact began.
@@ -127,7 +127,7 @@ mod tests {
     use crate::contact::smooth::{DrawnSurface, FanWeights, SmoothSurface};
     use crate::mesh::Surface;
     use crate::simulation::law::local::half_space::LocalBody;
-    use crate::simulation::law::local::near_edge::evaluate;
+    use crate::simulation::law::local::near_corner::evaluate;
     use crate::simulation::law::local::response::{Guess, LocalResponse, OtherContacts};
 
     /// A body whose modulus rises by a half over a length of two.
@@ -163,7 +163,7 @@ mod tests {
                 fields: &self.fields,
                 series: None,
                 pressed_surface: Some(&pressed),
-                edges: None,
+                corners: None,
                 scale: 1.0,
             };
             let tool = LocalTool { shape, radius: shape.bounding_radius(), pad: None, coefficient: 0.0 };
@@ -171,7 +171,7 @@ mod tests {
             let mut weights = FanWeights::new(near(&self.smooth));
             let (mut state, mut scratch) = (PressureState::default(), CellScratch::default());
             let mut footprint = FootprintScratch::default();
-            let mut edge_weights = weights.clone();
+            let mut corner_weights = weights.clone();
             let at = PlacedShape { contact_normal: DVec3::ZERO, ..placed_shape(shape, &contact, place) };
             footprint.near.find(&pressed, &self.query, &at);
             let first = footprint.first_touched(DVec3::ZERO).expect("a piece");
@@ -192,7 +192,7 @@ mod tests {
                     scratch: &mut scratch,
                     footprint: &mut footprint,
                     resolution,
-                    edge_weights: &mut edge_weights,
+                    corner_weights: &mut corner_weights,
                 };
                 let others = OtherContacts::default();
                 response = evaluate(body, tool, &contact, guess, others, &mut weights, cells).expect("an answer");

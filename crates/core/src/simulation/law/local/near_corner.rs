@@ -1,4 +1,4 @@
-//! A sphere near a sharp convex edge: partly the closed form, partly pressure cells (`contact::EdgeSurface`).
+//! A sphere near a sharp convex corner: partly the closed form, partly pressure cells (`contact::CornerSurface`).
 //!
 //! With the share `s(p')` of cells the energies of the half-space and of the body are means,
 //!
@@ -13,7 +13,7 @@ use glam::{DMat3, DQuat, DVec3};
 use super::half_space::{Indentation, LocalBody, LocalTool};
 use super::response::{Guess, LocalResponse, OtherContacts, bounded, evaluate_shape, evaluate_sphere};
 use super::wrench::CellMemory;
-use crate::contact::EdgeSurface;
+use crate::contact::CornerSurface;
 use crate::contact::smooth::{FanWeights, FootPoint};
 use crate::simulation::contacts::{Contact, LocalContact};
 use crate::simulation::model::Model;
@@ -22,14 +22,14 @@ use crate::simulation::model::Model;
 const AXES: DQuat = DQuat::from_xyzw(0.22, 0.41, 0.13, 0.875_385_629_654_298_5);
 
 /// Share of cells in a contact, and its gradient by the position, 1/m. A contact that fades stays as it is on its plane.
-fn share_of_cells(edges: Option<&EdgeSurface>, is_fading: bool, triangle: u32, position: DVec3) -> (f64, DVec3) {
-    edges.filter(|_| !is_fading).map_or((0.0, DVec3::ZERO), |edges| edges.share(triangle, position))
+fn share_of_cells(corners: Option<&CornerSurface>, is_fading: bool, triangle: u32, position: DVec3) -> (f64, DVec3) {
+    corners.filter(|_| !is_fading).map_or((0.0, DVec3::ZERO), |corners| corners.share(triangle, position))
 }
 
 /// Share of cells in a contact of a sphere as of the last tick.
 pub fn share_of_contact(model: &Model, contact: &Contact) -> f64 {
-    let (edges, local) = (model.edge_surfaces[contact.tool][contact.body].as_deref(), &contact.local);
-    share_of_cells(edges, local.is_fading, local.foot.triangle, local.relative_position).0
+    let (corners, local) = (model.corner_surfaces[contact.tool][contact.body].as_deref(), &contact.local);
+    share_of_cells(corners, local.is_fading, local.foot.triangle, local.relative_position).0
 }
 
 /// Whether a contact needs pressure cells.
@@ -49,13 +49,13 @@ pub fn evaluate(
 ) -> Option<LocalResponse> {
     // Set again with each foot.
     weights.touchable = 1.0;
-    let mut response = match (body.pressed_surface, body.edges) {
+    let mut response = match (body.pressed_surface, body.corners) {
         (Some(pressed), _) => evaluate_shape((body, pressed), tool, contact, guess, others, weights, cells),
-        (None, Some(edges)) => {
-            let share = share_of_cells(body.edges, contact.is_fading, guess.foot.triangle, guess.place);
+        (None, Some(corners)) => {
+            let share = share_of_cells(body.corners, contact.is_fading, guess.foot.triangle, guess.place);
             if share.0 > 0.0 {
-                let at = (body, edges, share);
-                return evaluate_near_edge(at, tool, contact, guess, others, weights, cells);
+                let at = (body, corners, share);
+                return evaluate_near_corner(at, tool, contact, guess, others, weights, cells);
             }
             evaluate_sphere(body, tool, contact, guess, others, weights)
         }
@@ -66,8 +66,8 @@ pub fn evaluate(
 }
 
 /// Evaluates the response of a sphere of which a share is on cells. `None` where the body is not touchable.
-fn evaluate_near_edge(
-    (body, edges, (share, gradient)): (LocalBody<'_>, &EdgeSurface, (f64, DVec3)),
+fn evaluate_near_corner(
+    (body, corners, (share, gradient)): (LocalBody<'_>, &CornerSurface, (f64, DVec3)),
     tool: LocalTool<'_>,
     contact: &LocalContact,
     guess: Guess<'_>,
@@ -75,11 +75,11 @@ fn evaluate_near_edge(
     weights: &mut FanWeights,
     cells: CellMemory<'_>,
 ) -> Option<LocalResponse> {
-    let CellMemory { state, scratch, footprint, resolution, edge_weights } = cells;
+    let CellMemory { state, scratch, footprint, resolution, corner_weights } = cells;
     let turned = LocalContact { orientation: AXES, ..*contact };
-    let mut at_edge = |weights: &mut FanWeights, unused: &mut FanWeights| {
-        let cells = CellMemory { state, scratch, footprint, resolution, edge_weights: unused };
-        let mut response = evaluate_shape((body, &edges.pressed), tool, &turned, guess, others, weights, cells)?;
+    let mut on_cells = |weights: &mut FanWeights, unused: &mut FanWeights| {
+        let cells = CellMemory { state, scratch, footprint, resolution, corner_weights: unused };
+        let mut response = evaluate_shape((body, &corners.pressed), tool, &turned, guess, others, weights, cells)?;
         // A sphere that turns stays the same.
         (response.indentation.torque, response.turn) = (DVec3::ZERO, DVec3::ZERO);
         response.foot.turning = bounded(response.foot.turning, 1.0 / tool.radius);
@@ -89,19 +89,19 @@ fn evaluate_near_edge(
         Some(response)
     };
     if share == 1.0 {
-        let mut response = at_edge(weights, edge_weights)?;
+        let mut response = on_cells(weights, corner_weights)?;
         response.set_series(body, weights, guess, 0.0);
         response.find_force(tool, contact, guess.place, others);
         return Some(response);
     }
     let sphere = evaluate_sphere(body, tool, contact, guess, others, weights)?;
-    edge_weights.touchable = 1.0;
-    let Some(at_edge) = at_edge(edge_weights, weights) else {
-        weights.touchable = edge_weights.touchable;
+    corner_weights.touchable = 1.0;
+    let Some(on_cells) = on_cells(corner_weights, weights) else {
+        weights.touchable = corner_weights.touchable;
         return None;
     };
-    let mut response = sphere.mixed(&at_edge, (share, gradient), guess.force);
-    weights.mix(edge_weights, share, gradient);
+    let mut response = sphere.mixed(&on_cells, (share, gradient), guess.force);
+    weights.mix(corner_weights, share, gradient);
     response.set_series(body, weights, guess, 1.0 - share);
     response.find_force(tool, contact, guess.place, others);
     Some(response)
@@ -124,28 +124,28 @@ impl LocalResponse {
     }
 }
 
-fn mixed_foot(sphere: &FootPoint, at_edge: &FootPoint, share: f64) -> FootPoint {
+fn mixed_foot(sphere: &FootPoint, on_cells: &FootPoint, share: f64) -> FootPoint {
     let mean = |one: DMat3, other: DMat3| one * (1.0 - share) + other * share;
     FootPoint {
-        position: sphere.position.lerp(at_edge.position, share),
-        normal: sphere.normal.lerp(at_edge.normal, share).normalize_or(sphere.normal),
-        distance: sphere.distance + share * (at_edge.distance - sphere.distance),
-        turning: mean(sphere.turning, at_edge.turning),
-        shift: mean(sphere.shift, at_edge.shift),
+        position: sphere.position.lerp(on_cells.position, share),
+        normal: sphere.normal.lerp(on_cells.normal, share).normalize_or(sphere.normal),
+        distance: sphere.distance + share * (on_cells.distance - sphere.distance),
+        turning: mean(sphere.turning, on_cells.turning),
+        shift: mean(sphere.shift, on_cells.shift),
         ..*sphere
     }
 }
 
-fn mixed_indentation(sphere: &Indentation, at_edge: &Indentation, (share, gradient): (f64, DVec3)) -> Indentation {
+fn mixed_indentation(sphere: &Indentation, on_cells: &Indentation, (share, gradient): (f64, DVec3)) -> Indentation {
     let mean = |one: f64, other: f64| one + share * (other - one);
     Indentation {
-        depth: mean(sphere.depth, at_edge.depth),
-        force: mean(sphere.force, at_edge.force),
-        radius: mean(sphere.radius, at_edge.radius),
-        stiffness: mean(sphere.stiffness, at_edge.stiffness),
-        energy: mean(sphere.energy, at_edge.energy),
-        gradient: sphere.gradient.lerp(at_edge.gradient, share) + gradient * (at_edge.energy - sphere.energy),
-        lever: sphere.lever.lerp(at_edge.lever, share),
+        depth: mean(sphere.depth, on_cells.depth),
+        force: mean(sphere.force, on_cells.force),
+        radius: mean(sphere.radius, on_cells.radius),
+        stiffness: mean(sphere.stiffness, on_cells.stiffness),
+        energy: mean(sphere.energy, on_cells.energy),
+        gradient: sphere.gradient.lerp(on_cells.gradient, share) + gradient * (on_cells.energy - sphere.energy),
+        lever: sphere.lever.lerp(on_cells.lever, share),
         ..*sphere
     }
 }
