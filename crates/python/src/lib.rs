@@ -37,8 +37,8 @@ mod _native {
     use crate::body::{determinant_ranges, mass, stiffness, volumes};
     #[pymodule_export]
     use crate::changes::{
-        add_body, add_tool, assume_devices, connect, device_limits, disconnect, place_body, remove_body, remove_tool,
-        replace_body, set_strain_measures, tool_stiffness,
+        add_body, add_tool, assume_devices, connect, device_limits, disconnect, hold_series, place_body, remove_body,
+        remove_tool, replace_body, set_series, set_strain_measures, tool_positions, tool_stiffness,
     };
     #[pymodule_export]
     use crate::children::end_with_parent;
@@ -73,7 +73,7 @@ mod _native {
     #[pymodule_export]
     use crate::sensor::SensorCore;
     #[pymodule_export]
-    use crate::series::series;
+    use crate::series::{Series, SeriesFile};
     #[pymodule_export]
     use crate::simulation::SimulationCore;
     #[pymodule_export]

@@ -1,6 +1,7 @@
 //! Conversion of scene arguments from Python, and of what is read back.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use glam::DQuat;
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
@@ -8,7 +9,7 @@ use palpate_core::contact::Moduli;
 use palpate_core::contact::local::StrainLaw;
 use palpate_core::contact::shape::ToolShape;
 use palpate_core::dynamics::Energy;
-use palpate_core::simulation::{Contact, LawKind, Mode, Model, Pose, Snapshot};
+use palpate_core::simulation::{Contact, KnownSeries, LawKind, Mode, Model, Pose, Snapshot};
 use palpate_core::{Error, Result};
 use palpate_devices::DeviceLimits;
 pub use palpate_scene::unit_quaternion as quaternion;
@@ -20,6 +21,7 @@ use pyo3::types::PyDict;
 use crate::dynamics::{SchemeArguments, scheme};
 use crate::errors::to_python;
 use crate::green::GreenCore;
+use crate::series::Series;
 
 /// Eigenvalues (m), their shapes at the surface dofs (3s, m), the scheme, whether each mode is integrated exactly instead,
 /// and the spring between tools and patches, N/m.
@@ -29,14 +31,14 @@ pub type DynamicsArguments<'py> = (PyReadonlyArray1<'py, f64>, PyReadonlyArray2<
 pub type ModuliArguments<'py> =
     (PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>, Option<PyReadonlyArray2<'py, f64>>, bool);
 /// Green's function, position (m), orientation (unit quaternion w x y z), what moves the body, its elastic constants, and series by the
-/// radius of tools, m.
+/// radius of tools, m; `None` where nothing is known yet.
 pub type BodyArguments<'py> = (
     PyRef<'py, GreenCore>,
     [f64; 3],
     [f64; 4],
     Option<DynamicsArguments<'py>>,
     Option<ModuliArguments<'py>>,
-    Vec<(f64, PyReadonlyArray2<'py, f64>)>,
+    Vec<(f64, Option<PyRef<'py, Series>>)>,
 );
 /// What a tool looks like: a kind and its lengths in m, three at most; of a surface vertices and triangles.
 pub type ShapeArguments = (String, [f64; 3], Vec<[f64; 3]>, Vec<[u32; 3]>);
@@ -69,10 +71,11 @@ pub fn scene_body(arguments: &BodyArguments<'_>) -> PyResult<Body> {
         })
         .transpose()?;
     let placement = placement(*position, *orientation);
-    let of_radius = |(radius, fields): &(f64, PyReadonlyArray2<'_, f64>)| -> PyResult<_> {
-        Ok((*radius, fields.as_slice()?.as_chunks().0.into()))
+    let of_radius = |(radius, series): &(f64, Option<PyRef<'_, Series>>)| match series {
+        Some(series) => series.for_loop(*radius),
+        None => Arc::new(KnownSeries::new(*radius, vec![], vec![])),
     };
-    let series = series.iter().map(of_radius).collect::<PyResult<_>>()?;
+    let series = series.iter().map(of_radius).collect();
     Ok(Body { name: String::new(), green: green.green.clone(), placement, moduli, motion, strain: None, series })
 }
 

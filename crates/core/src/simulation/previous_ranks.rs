@@ -33,6 +33,7 @@ impl State {
                 std::mem::swap(body, old);
             }
         }
+        self.add_series(before, previous_ranks, model);
         for (tool, old) in self.tools.iter_mut().zip(&previous_ranks.tools) {
             let Some(old) = old.and_then(|old| before.tools.get(old)) else { continue };
             (tool.previous_pose, tool.released_energy) = (old.previous_pose, old.released_energy);

@@ -5,6 +5,7 @@ use glam::{DMat3, DVec3};
 use super::body::BodyModel;
 use super::contacts::Contacts;
 use super::input::Pose;
+use super::known_series::{SeriesOfBody, initial_series};
 use super::model::Model;
 use super::motion::Motion;
 use super::passivity::PassivityObserver;
@@ -49,6 +50,8 @@ pub struct BodyState {
     pub strain: Option<Box<StrainWatch>>,
     /// Share of the forces of sliding contacts within the strain limit.
     pub(super) limit_share: LimitShare,
+    /// Higher orders of its displacement by the radius of spheres.
+    pub(super) series: SeriesOfBody,
     /// Energy of the contacts of a body at rest and work of the tools.
     pub(super) passivity: PassivityObserver,
 }
@@ -76,6 +79,7 @@ impl State {
             motion: body.dynamics.as_ref().map(|dynamics| Motion::new(&dynamics.modes)),
             strain: None,
             limit_share: LimitShare::default(),
+            series: initial_series(body),
             passivity: PassivityObserver::default(),
         };
         Self {
