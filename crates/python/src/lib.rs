@@ -26,6 +26,7 @@ mod sensor;
 mod series;
 mod simulation;
 mod strain;
+mod strain_law;
 mod surface;
 
 /// The module `palpate._native`.
@@ -69,7 +70,7 @@ mod _native {
     #[pymodule_export]
     use crate::rerun::rerun;
     #[pymodule_export]
-    use crate::scene::{checksum, strain_terms};
+    use crate::scene::checksum;
     #[pymodule_export]
     use crate::sensor::SensorCore;
     #[pymodule_export]
@@ -78,6 +79,8 @@ mod _native {
     use crate::simulation::SimulationCore;
     #[pymodule_export]
     use crate::strain::{StrainMeasure, StrainResponse, contact_patch, provisional_displacement};
+    #[pymodule_export]
+    use crate::strain_law::strain_terms;
     #[pymodule_export]
     use crate::surface::SurfaceSearch;
 

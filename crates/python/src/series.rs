@@ -15,7 +15,7 @@ use pyo3::types::PyTuple;
 use crate::errors::to_python;
 use crate::green::problem;
 use crate::interruptible::run_interruptible;
-use crate::scene::strain_law;
+use crate::strain_law::strain_law;
 
 /// Laws by name and ratios (k), and the law of each element (m).
 pub type LawArguments<'py> = (Vec<(String, f64, f64)>, PyReadonlyArray1<'py, u32>);

@@ -119,7 +119,7 @@ def build(
 
 
 def marked_as_growing(built: BuiltScene, growing: Mapping[int, BackgroundPrecompute]) -> BuiltScene:
-    """Mark the bodies of which more is being computed."""
+    """Mark the bodies that are still being computed."""
     bodies = list(built.bodies)
     for rank, background in growing.items():
         bodies[rank] = replace(bodies[rank], is_growing=not background.is_complete)

@@ -11,6 +11,7 @@ from typing import Any
 from palpate import _native
 from palpate.errors import SceneError
 from palpate.scene import BuiltBody, BuiltScene, Scene
+from palpate.scene.series import sphere_radii
 from palpate.scene.tables import SceneTables
 
 # Raised when what is recorded, or what follows from it, changes.
@@ -125,10 +126,13 @@ def with_recorded_series(about: dict[str, str], built: BuiltScene) -> BuiltScene
 
     """
     recorded = json.loads(about.get("series", "[]")) or [[] for _ in built.bodies]
+    radii = sphere_radii(built)
     bodies = []
     for body, of_body in zip(built.bodies, recorded, strict=True):
         # Before format 4 a series was known as a whole, or not at all.
         blocks = dict(entry if isinstance(entry, list) else (entry, None) for entry in of_body)
+        # A scene with other tools has other series.
+        blocks = {radius: text for radius, text in blocks.items() if radius in radii}
         known = dict(body.series)
         series = tuple((radius, _part(body, known.get(radius), text)) for radius, text in blocks.items())
         bodies.append(replace(body, series=series))

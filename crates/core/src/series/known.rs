@@ -3,9 +3,13 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::places::{BLOCK, SAME_SIDE};
 use crate::contact::SeriesFields;
 
+/// Places that are solved together. The last bits of a solution depend on its neighbours in the block, so that a block is always
+/// computed as a whole.
+pub const BLOCK: usize = 8;
+/// Cosine between normals of fans on one side of a body.
+pub const SAME_SIDE: f64 = 0.5;
 /// Distance up to which a place counts at a fan, over that of places.
 const REACH: f64 = 2.0;
 

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::body::{HyperelasticBody, PatchLoad};
 use super::coefficients::coefficients;
 use super::half_space::half_space_terms;
-use super::known::{Layout, Side};
+use super::known::{BLOCK, Layout, SAME_SIDE, Side};
 use crate::Result;
 use crate::contact::local::StrainLaw;
 use crate::contact::smooth::{Fan, SmoothSurface};
@@ -23,11 +23,6 @@ const THICKNESSES: f64 = 1.5;
 const LEAST_RADII: f64 = 0.9;
 /// Distance of places over the tool's radius: the coefficients are as smooth as the patch is wide.
 const SPACING: f64 = 0.9;
-/// Cosine between normals of fans on one side of a body.
-pub const SAME_SIDE: f64 = 0.5;
-/// Places that are solved together. The last bits of a solution depend on its neighbours in the block, so that a block is always
-/// computed as a whole.
-pub const BLOCK: usize = 8;
 
 /// Where a series is computed.
 struct Place {

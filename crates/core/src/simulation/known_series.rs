@@ -1,17 +1,8 @@
-//! Higher orders of a body's displacement while more and more of them become known.
-//!
-//! They are computed beside the running loop, place by place, and handed over as a whole. Where they are not known, a contact follows
-//! the half-space of the material. A contact under a tool has the same coefficients as long as it lasts: an array that would change
-//! those at its fans waits, for otherwise the force would jump.
+//! Higher orders of a body's displacement as far as they are known.
 
 use std::sync::Arc;
 
-use super::body::BodyModel;
-use super::contacts::{Contact, Mode};
-use super::model::Model;
-use super::state::{BodyState, State};
-use super::tool::LawKind;
-use super::{MAX_TOOLS, PreviousRanks};
+use super::MAX_TOOLS;
 use crate::contact::SeriesFields;
 
 /// Higher orders of a body's displacement below spheres of one radius, as far as they are known.
@@ -37,76 +28,3 @@ impl KnownSeries {
 
 /// Those of a body by radius, in any order.
 pub type SeriesOfBody = [Option<Arc<KnownSeries>>; MAX_TOOLS];
-
-/// What a simulation starts with.
-pub fn initial_series(body: &BodyModel) -> SeriesOfBody {
-    std::array::from_fn(|rank| body.series.get(rank).cloned())
-}
-
-impl BodyState {
-    /// Coefficients at the fans for a sphere of `radius`, m.
-    pub fn series(&self, radius: f64) -> Option<&KnownSeries> {
-        self.series.iter().flatten().find(|series| series.radius == radius).map(Arc::as_ref)
-    }
-}
-
-impl State {
-    /// Whether a series may be exchanged for the present one of its radius without changing the force of a contact: no fan that may
-    /// have weight there has other coefficients.
-    pub fn may_take_series(&self, model: &Model, body: usize, new: &KnownSeries) -> bool {
-        let (Some(fixed), Some(state)) = (model.bodies.get(body), self.bodies.get(body)) else { return false };
-        let (Some(local), Some(old)) = (&fixed.local, state.series(new.radius)) else { return false };
-        let is_pressed = |contact: &Contact| {
-            let tool = model.tools.get(contact.tool);
-            contact.body == body
-                && contact.law == LawKind::LOCAL
-                && contact.mode != Mode::Free
-                && tool.is_some_and(|tool| tool.radius == new.radius)
-        };
-        let is_same = |&fan: &u32| old.fields.get(fan as usize) == new.fields.get(fan as usize);
-        new.fields.len() == fixed.fan_count()
-            && self
-                .contacts
-                .iter()
-                .filter(|(contact, _)| is_pressed(contact))
-                .all(|(contact, _)| local.smooth.fans_reaching(contact.local.foot.triangle).iter().all(is_same))
-    }
-
-    /// Exchanges the series of a radius, and returns the previous one, whose memory must not be freed in a tick; the new one itself where
-    /// there is none of its radius.
-    pub fn take_series(&mut self, body: usize, new: Arc<KnownSeries>) -> Arc<KnownSeries> {
-        let mut present = self.bodies.get_mut(body).into_iter().flat_map(|state| state.series.iter_mut().flatten());
-        match present.find(|series| series.radius == new.radius) {
-            Some(series) => std::mem::replace(series, new),
-            None => new,
-        }
-    }
-
-    /// Exchanges the series of all bodies with those of a state of the same model.
-    pub fn swap_series(&mut self, other: &mut Self) {
-        for (body, other) in self.bodies.iter_mut().zip(&mut other.bodies) {
-            std::mem::swap(&mut body.series, &mut other.series);
-        }
-    }
-
-    /// Adds series of the bodies of a new model to those that are taken over: of radii that come with it. Bodies have been exchanged
-    /// already: `before` has those of the new model. Nothing is allocated or freed.
-    pub(super) fn add_series(&mut self, before: &mut State, previous_ranks: &PreviousRanks, model: &Model) {
-        for (state, old) in self.bodies.iter_mut().zip(&previous_ranks.bodies) {
-            let Some(given) = old.and_then(|old| before.bodies.get_mut(old)) else { continue };
-            for new in given.series.iter_mut().filter(|new| new.is_some()) {
-                let radius = new.as_ref().map_or(0.0, |new| new.radius);
-                if state.series(radius).is_some() {
-                    continue;
-                }
-                let is_unused = |series: &&mut Option<Arc<KnownSeries>>| {
-                    let of_tool = |radius: f64| model.tools.iter().any(|tool| tool.radius == radius);
-                    !series.as_ref().is_some_and(|series| of_tool(series.radius))
-                };
-                if let Some(place) = state.series.iter_mut().find(is_unused) {
-                    std::mem::swap(place, new);
-                }
-            }
-        }
-    }
-}

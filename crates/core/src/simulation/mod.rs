@@ -23,6 +23,7 @@ mod passivity;
 mod previous_ranks;
 mod rotation;
 mod scratch;
+mod series_take_up;
 mod slip;
 mod snapshot;
 mod solve;
