@@ -6,7 +6,7 @@ use super::half_space::{Fields, HalfSpace, Indentation, LocalBody, LocalTool};
 use super::wrench::{CellMemory, indent_shape, placed_shape};
 use crate::contact::footprint::PressedSurface;
 use crate::contact::local::{
-    Friction, FrictionResponse, HigherOrders, SERIES_FIELDS, WidenedContact, Widening, higher_orders,
+    Friction, FrictionResponse, HigherOrders, SERIES_FIELDS, WidenedContact, Widening, blended_series, higher_orders,
 };
 use crate::contact::regular::{COMPLIANCE, GAUSS, MEAN, PLANE_STRAIN, WIDENING, WIDTH, compliance_of, reference_area};
 use crate::contact::shape::ToolShape;
@@ -75,8 +75,10 @@ pub struct LocalResponse {
     pub higher: HigherOrders,
     higher_at_guess: HigherOrders,
     series: Option<Blended<SERIES_FIELDS>>,
-    /// Part to which the contact is turned by these (`turned_push`).
+    /// Part to which these turn the contact (`turned_push`).
     turned_part: f64,
+    /// Part of the place where they are known.
+    pub known: f64,
     scale: f64,
     /// Offset of the tool along the surface from above its contact, m, and its distance from the contact, m.
     pub offset: DVec3,
@@ -142,7 +144,10 @@ pub(super) fn evaluate_sphere(
     };
     let mut response = LocalResponse::at(body, foot, &fields, indentation);
     response.slope = slope(body, guess.force, others, &fields);
-    response.series = body.series.map(|series| weights.blend(series));
+    if let Some(series) = body.series {
+        let (blended, known) = blended_series(series, weights);
+        (response.series, response.known) = (Some(blended), known);
+    }
     response.distance = distance;
     response.guess = ForceGuess { force: guess.force, friction: guess.friction, offset: guess.offset };
     if response.series.is_some() {
@@ -299,11 +304,6 @@ impl LocalResponse {
         }
     }
 
-    /// Whether higher orders of the body's displacement are known.
-    pub fn has_series(&self) -> bool {
-        self.series.is_some()
-    }
-
     /// Higher orders of the body's displacement at a force, N.
     fn higher_orders_at(&self, force: DVec3) -> HigherOrders {
         let at = |series| higher_orders(series, (self.foot.normal, &self.foot.turning), force, self.scale);
@@ -315,7 +315,8 @@ impl LocalResponse {
     pub(super) fn set_series(&mut self, body: LocalBody<'_>, weights: &FanWeights, guess: Guess<'_>, turned_part: f64) {
         let Some(series) = body.series else { return };
         self.slope -= self.higher_at_guess.slope;
-        (self.series, self.turned_part) = (Some(weights.blend(series)), turned_part);
+        let (blended, known) = blended_series(series, weights);
+        (self.series, self.known, self.turned_part) = (Some(blended), known, turned_part);
         self.guess = ForceGuess { force: guess.force, friction: guess.friction, offset: guess.offset };
         self.higher_at_guess = self.higher_orders_at(guess.force);
         self.slope += self.higher_at_guess.slope;
@@ -337,7 +338,8 @@ impl LocalResponse {
         let part = if self.series.is_some() { self.turned_part } else { 0.0 };
         let mut push = slope - indentation.gradient;
         if part > 0.0 {
-            push = push.lerp(self.turned_push(whole), part);
+            let turned = self.turned_push(whole);
+            push = if part == 1.0 { turned } else { push.lerp(turned, part) };
         }
         let pressing = push.length();
         if indentation.force == 0.0 || pressing == 0.0 {

@@ -319,7 +319,7 @@ fn evaluate_contacts(
             local.footprint.others = other_planes(&state.contacts, slot);
         }
         let tool = state.contacts.slots[slot].tool;
-        let response = local_body(model, state, tool, body).and_then(|surface| {
+        let response = local_body(model, &state.bodies, tool, body).and_then(|surface| {
             let LocalScratch {
                 positions,
                 responses,
