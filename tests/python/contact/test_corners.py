@@ -31,6 +31,9 @@ DIRECT = {
 # Largest difference from it: cells over a corner have the compliance of its edges.
 TOLERANCE = {"down": 0.18, "diagonal": 0.45, "from one side": 0.30, "from outside": 0.34, "from inside": 0.36}
 
+# Part of its largest force that a tool keeps at the least while it is driven in and slides off to a side.
+LEFT = 0.3
+
 
 def pressed(loops: Loops, tool: str, way: np.ndarray, deep: float, rotation: Rotation) -> tuple[np.ndarray, np.ndarray]:
     """Depths (t,), m, and forces (t, 3), N, of a press on the corner."""
@@ -54,7 +57,7 @@ def test_a_tool_that_is_driven_into_a_corner_keeps_its_contact(loops, name, tool
     _, forces = pressed(loops, tool, WAYS[name], 2.5 * RADII[tool], rotation)
     size = np.linalg.norm(forces, axis=1)
     assert size.max() > 0.05
-    assert (size >= 0.5 * np.maximum.accumulate(size)).all()
+    assert (size >= LEFT * np.maximum.accumulate(size)).all()
 
 
 @pytest.mark.parametrize("part", [0.25, 0.5, 1.0])
