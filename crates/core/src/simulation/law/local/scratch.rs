@@ -241,5 +241,6 @@ pub fn local_body<'a>(model: &'a Model, state: &State, tool: usize, body: usize)
         series: regular.series.as_deref(),
         pressed_surface: model.pressed_surfaces[tool][body].as_deref(),
         scale: state.bodies[body].stiffness_scale,
+        is_hyperelastic: local.is_hyperelastic,
     })
 }
