@@ -22,14 +22,15 @@ from viewer import test_viewer_two_tools as two_tools
 
 pytestmark = MARKS
 
+# The pointer and a setting on their way to the worker and back; the others take the same way.
 QUICK = [
     controls.test_reset_puts_all_sliders_back_at_once,
-    pages.test_a_drag_slides_along_the_surface,
     pages.test_a_grab_pulls,
-    pages.test_a_press_begins_at_the_surface_and_comes_to_a_gentle_depth,
-    pages.test_the_size_of_the_body_is_told,
 ]
 LONG = [
+    pages.test_a_drag_slides_along_the_surface,
+    pages.test_a_press_begins_at_the_surface_and_comes_to_a_gentle_depth,
+    pages.test_the_size_of_the_body_is_told,
     controls.test_a_number_is_typed_and_a_double_click_brings_the_default,
     pages.test_deformation_drawn_larger_is_marked,
     pages.test_felt_stiffness_is_the_slope_of_force_against_depth,
