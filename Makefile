@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 ARGS ?=
 
-.PHONY: demo test campaigns install web site wheel sdist other-build sanitize lint docs viewer check-tools clean
+.PHONY: demo test campaigns install web site wheel sdist other-build sanitize lint check-systems docs viewer check-tools clean
 .DEFAULT_GOAL := demo
 
 check-tools:
@@ -115,6 +115,10 @@ lint: $(VENV)/.installed
 	$(BIN)/ruff format --check .
 	$(BIN)/python scripts/check_architecture.py
 	$(BIN)/python scripts/check_words.py
+
+# Windows and macOS, as far as their compilers are not needed.
+check-systems:
+	scripts/check_systems.sh
 
 # The site, docs/_build/html/index.html: the reference is generated from the program, the tutorials are run, warnings are
 # errors; scenes inside tutorials are the page and its program. Nothing is taken from the network once the packages are there.

@@ -17,7 +17,9 @@ import palpate
 from benches.output import Json, Out, Table, make_folder, print_written, show
 from benches.strain.bodies import CELL, Pressed, cuboids, cylinders, liver
 from benches.strain.cylinders import RADIUS
-from benches.strain.peers import beside_peers
+from benches.strain.elements import lacking_rows
+from benches.strain.elements import table as elements_table
+from benches.strain.peers import beside_peers, left_out
 from benches.strain.peers import table as peers_table
 from benches.strain.ticks import sliding_ticks
 from palpate.scene import BuiltScene, Scene
@@ -33,7 +35,10 @@ TOUCHED = 3.6
 
 @dataclass(frozen=True)
 class Row:
-    """Errors of the force at the depths, relative; `stated` is that of B."""
+    """Errors of the force at the depths, relative; `stated` is that of B.
+
+    `unsolved` are depths, m, at which full Newton's method does not converge.
+    """
 
     name: str
     nodes: int
@@ -43,6 +48,7 @@ class Row:
     local: list[float]
     series: list[float]
     stated: list[float]
+    unsolved: list[float]
 
 
 def pressed(case: Pressed, law: str, series: bool, folder: Path) -> tuple[np.ndarray, np.ndarray]:
@@ -79,13 +85,14 @@ def measure(case: Pressed) -> Row:
         full.tolist(),
         *errors,
         found[2][1][:count].tolist(),
+        case.depths[count:].tolist(),
     )
 
 
 def cases(cell: float, only: str, places: int) -> Iterator[Pressed]:
     """Return the bodies whose name begins with one of the words."""
     for case in itertools.chain(cylinders(cell), cuboids(), liver(places)):
-        if len(case.depths) and case.name.startswith(tuple(only.split(","))):
+        if case.name.startswith(tuple(only.split(","))):
             yield case
 
 
@@ -103,7 +110,9 @@ def table(rows: list[Row]) -> Table:
         for row in rows
     ]
     headings = ["body", "nodes", "depth, mm", "linear, %", "A, %", "B, %", "stated of B, %"]
-    return Table("Error of the force beside full Newton", headings, lines)
+    unsolved = {row.name: ", ".join(f"{1e3 * depth:.3g}" for depth in row.unsolved) for row in rows if row.unsolved}
+    notes = [f"{name}: full Newton's method does not converge at {depths} mm" for name, depths in unsolved.items()]
+    return Table("Error of the force beside full Newton", headings, lines, notes=notes)
 
 
 def plot(rows: list[Row], path: Path) -> None:
@@ -128,9 +137,10 @@ def strain(
     out: Out = None,
     cell: Annotated[float, typer.Option(help="Edges of elements below the sphere, m, on cylinders.")] = CELL,
     only: Annotated[str, typer.Option(help="Bodies whose names begin so, separated by commas.")] = "",
-    places: Annotated[int, typer.Option(help="Places on the liver.")] = 4,
+    places: Annotated[int, typer.Option(help="Places on the liver.")] = 10,
     ticks: Annotated[bool, typer.Option("--ticks", help="Time sliding ticks of A and B instead.")] = False,
     peers: Annotated[bool, typer.Option("--peers", help="Press a column by MuJoCo and Drake instead.")] = False,
+    elements: Annotated[bool, typer.Option("--elements", help="Measure what elements lack of a half-space.")] = False,
 ) -> None:
     """Press spheres into neo-Hookean bodies: errors of the linear law, A and B beside full Newton solutions.
 
@@ -141,9 +151,13 @@ def strain(
         for name, times in (("A", first), ("B", second)):
             print(f"{name}, sliding, us: median {times.median:.1f}, 99.9 % {times.p999:.1f}, worst {times.worst:.0f}")
         return
+    if elements:
+        lacking = list(lacking_rows())
+        show(as_json, lacking, elements_table(lacking))
+        return
     if peers:
         found = beside_peers()
-        show(as_json, found, peers_table(found))
+        show(as_json, found, peers_table(found), left_out=left_out())
         return
     folder, rows = make_folder(out), []
     for case in cases(cell, only, places):

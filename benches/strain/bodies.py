@@ -14,7 +14,6 @@ from pathlib import Path
 import numpy as np
 
 import palpate
-from benches.strain.axisymmetric import DivergedError
 from benches.strain.cylinders import RADIUS, references
 from benches.strain.materials import NeoHookean
 from benches.strain.solid import Solid
@@ -26,8 +25,6 @@ MODULUS, POISSON = 10e3, 0.45
 SOLVED = Path(__file__).with_name("solid_forces.json")
 # Edges of elements below the sphere, m, and distance up to which they are that fine.
 CELL, FINE = 0.004, 0.012
-# Longest step of a full solution over the radius.
-STEP = 0.15
 
 
 @dataclass(frozen=True)
@@ -61,7 +58,14 @@ class Pressed:
         return palpate.Body(self.mesh, material=palpate.Material(MODULUS, self.poisson, law=law), fixed=self.held)
 
     def full(self) -> np.ndarray:
-        """Return forces along the normal, N, down to where Newton's method converges; stored beside this file."""
+        """Return forces along the normal, N, down to where Newton's method converges; stored beside this file.
+
+        Raises
+        ------
+        RuntimeError
+            It does not converge at the first depth.
+
+        """
         if self.forces is not None:
             return self.forces
         asked = {"nodes": len(self.mesh.nodes), "depths": self.depths.tolist()}
@@ -73,15 +77,10 @@ class Pressed:
 
     def _solved(self) -> list[float]:
         solid = Solid(self.mesh, NeoHookean(MODULUS, self.poisson), self.held.all(axis=1))
-        found, reached = [], 0.0
-        for depth in self.depths:
-            try:
-                for step in np.linspace(reached, depth, int(np.ceil((depth - reached) / (STEP * RADIUS))) + 1)[1:]:
-                    force = solid.press(self.place + self.normal * (RADIUS - step), RADIUS)
-            except DivergedError:
-                break
-            reached = depth
-            found.append(round(abs(float(force @ self.normal)), 6))
+        found = [round(force, 6) for force in solid.pressed(self.place, self.normal, RADIUS, self.depths)]
+        if not found:
+            # An empty row would count as one without an error.
+            raise RuntimeError(f"{self.name}: Newton's method does not converge at {1e3 * self.depths[0]:g} mm")
         return found
 
 

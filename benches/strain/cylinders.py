@@ -82,7 +82,8 @@ class Cylinder:
     def _axes(self) -> tuple[np.ndarray, np.ndarray]:
         """Return coordinates across and down, m."""
         if self.cell is not None:
-            reach = REACH * RADIUS
+            # A plate bends most at its rim: with coarse elements there it is 6 % too stiff.
+            reach = self.radius if self.support == "rim" else REACH * RADIUS
             across = graded(-self.radius, self.radius, 0.0, min(reach, self.radius), self.cell)
             return across, -graded(0.0, self.height, 0.0, min(reach, self.height), self.cell)[::-1]
         across, down = 2 * max(1, round(self.radius / EDGE)), max(2, round(self.height / EDGE))

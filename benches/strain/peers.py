@@ -27,6 +27,8 @@ COLUMN, CELL = "column 0.3", 0.006
 LOADS = np.array([0.5, 1.0, 2.0, 3.5])
 # Ticks of a press by Palpate.
 TICKS = 2000
+# Programs that would take part, and why they do not.
+NEVER = {"SOFA": "PyPI has no wheel of it"}
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,11 @@ def beside_peers() -> list[PeerRow]:
     return rows
 
 
+def left_out() -> dict[str, str]:
+    """Programs that took no part, and why."""
+    return {name: f"not installed (pip install {package})" for name, package in contact_peers.missing().items()} | NEVER
+
+
 def _row(program: str, column: Cylinder, forces: np.ndarray, seconds: float) -> PeerRow:
     return PeerRow(program, (np.abs(forces) / column.forces - 1.0).tolist(), 1e6 * seconds)
 
@@ -80,4 +87,5 @@ def table(rows: list[PeerRow]) -> Table:
         [row.program, ", ".join(f"{100 * error:+.1f}" for error in row.errors), f"{row.step:,.0f}"] for row in rows
     ]
     headings = ["program", f"error of the force at {depths} mm, %", "step, us"]
-    return Table("A sphere of 10 mm pressed into a column of 50 mm height and diameter", headings, lines)
+    notes = [f"{name} is left out: {reason}" for name, reason in left_out().items()]
+    return Table("A sphere of 10 mm pressed into a column of 50 mm height and diameter", headings, lines, notes=notes)

@@ -1,7 +1,8 @@
 """Solids of 10-node tetrahedra at finite strain under a rigid, frictionless sphere: full Newton's method.
 
 Total Lagrangian, four points of quadrature an element. Pressures at points of the surface keep the sphere out, by the
-method of augmented Lagrangians.
+method of augmented Lagrangians. Bodies of more than 20,000 unknowns need `pypardiso` (extra `bench`): SuperLU takes
+minutes for each of some hundred factorisations.
 """
 
 from __future__ import annotations
@@ -14,13 +15,20 @@ from benches.strain.axisymmetric import DivergedError
 from benches.strain.materials import Material
 from palpate import TetMesh
 
+try:
+    from pypardiso import PyPardisoSolver
+except ImportError:
+    PyPardisoSolver = None
+
 # Stiffness of the penalty over E / R.
 PENALTY = 60.0
 # Largest residual of a solution over the force; most steps to it; change of the force by the last update of pressures;
 # most updates.
-TOLERANCE, MOST_STEPS, SETTLED, MOST_UPDATES = 1e-6, 40, 1e-3, 12
+TOLERANCE, MOST_STEPS, SETTLED, MOST_UPDATES = 1e-6, 25, 1e-3, 12
 # Longest step over the radius, and least share of a step that is tried.
 LONGEST_STEP, LEAST_SHARE = 0.2, 0.03
+# Longest and shortest step of the sphere over its radius.
+LONGEST_PRESS, SHORTEST_PRESS = 0.15, 0.01
 # Points along an edge of each face at which the sphere is kept out.
 FACE_POINTS = 6
 
@@ -57,8 +65,10 @@ class Solid:
         self._areas = 0.5 * np.linalg.norm(normal, axis=1)[:, None] * share
         self._pressures = np.zeros_like(self._areas)
 
-    def press(self, centre: np.ndarray, radius: float) -> np.ndarray:
+    def press(self, centre: np.ndarray, radius: float, updates: int = MOST_UPDATES) -> np.ndarray:
         """Put the sphere's centre at a place, m; return the force on the sphere (3,), N.
+
+        Fewer updates of the pressures leave a part of the depth to the penalty: enough on the way to a depth.
 
         Raises
         ------
@@ -67,14 +77,43 @@ class Solid:
 
         """
         last = np.inf
-        for _ in range(MOST_UPDATES):
+        for _ in range(updates):
             force = self._balance(centre, radius)
             self._pressures = self._pressed(centre, radius)[0]
             size = np.linalg.norm(force)
             if abs(size - last) <= SETTLED * size:
                 return force
             last = size
+        if updates < MOST_UPDATES:
+            return force
         raise DivergedError("the pressures have not settled")
+
+    def pressed(self, place: np.ndarray, normal: np.ndarray, radius: float, depths: np.ndarray) -> list[float]:
+        """Press the sphere at a place of an outward normal to ascending depths, m; return forces along the normal, N.
+
+        A step begins with the displacement of the last one once more; one that fails is divided, and the next is longer
+        again. The forces are fewer than the depths where none converges.
+        """
+        found, reached, force, rate, step = [], 0.0, np.zeros(3), np.zeros_like(self.u), LONGEST_PRESS * radius
+        for depth in depths:
+            while reached < depth:
+                # No short step is left over.
+                trial = depth if depth - reached < 1.3 * step else reached + step
+                before = self.u.copy(), self._pressures.copy()
+                try:
+                    self.u = before[0] + (trial - reached) * rate
+                    centre = place + normal * (radius - trial)
+                    force = self.press(centre, radius, MOST_UPDATES if trial == depth else 1)
+                except DivergedError:
+                    (self.u, self._pressures), rate = before, np.zeros_like(self.u)
+                    step = 0.5 * (trial - reached)
+                    if step < SHORTEST_PRESS * radius:
+                        return found
+                    continue
+                rate, reached = (self.u - before[0]) / (trial - reached), trial
+                step = min(1.4 * step, LONGEST_PRESS * radius)
+            found.append(abs(float(force @ normal)))
+        return found
 
     def _balance(self, centre: np.ndarray, radius: float) -> np.ndarray:
         step, share = np.zeros_like(self.u), 1.0
@@ -93,7 +132,7 @@ class Solid:
                 return force
             whole = (tangent + contact)[self._free][:, self._free].tocsc()
             change = np.zeros(self.u.size)
-            change[self._free] = -splu(whole, permc_spec="MMD_AT_PLUS_A").solve(residual)
+            change[self._free] = -_solved(whole, residual)
             share = min(1.0, LONGEST_STEP * radius / np.abs(change).max())
             step = change.reshape(-1, 3)
             self.u += share * step
@@ -138,6 +177,16 @@ class Solid:
         matrix = sparse.csc_matrix((blocks.ravel(), (rows, columns)), (size, size))
         # What pushes the body down pushes the sphere up.
         return forces.ravel(), matrix, loads.sum(axis=(0, 1))
+
+
+def _solved(matrix: sparse.csc_matrix, right: np.ndarray) -> np.ndarray:
+    """Solve with a symmetric matrix, which need not be positive."""
+    if PyPardisoSolver is None:
+        return splu(matrix, permc_spec="MMD_AT_PLUS_A").solve(right)
+    solver = PyPardisoSolver(mtype=-2)
+    found = solver.solve(sparse.triu(matrix, format="csr"), right)
+    solver.free_memory(everything=True)
+    return found
 
 
 def _stress(material: Material, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -40,7 +40,7 @@ class Computing:
             if session.simulation.recording is None:  # a recording is of one scene: the store waits
                 green = background.take()
                 if green is not None:
-                    session.take_store(body, green)
+                    session.take_store(body, green, not background.is_complete)
         message = self.message(session)
         if self._last_message is not None and _is_same(message, self._last_message):
             return None

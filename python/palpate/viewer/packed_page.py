@@ -24,6 +24,8 @@ from palpate.viewer.session import Session
 from palpate.viewer.shown_body import ShownBody, title_of
 from palpate.viewer.tool_shapes import kind_of, outline, shape_choices, with_shape
 
+# Fields that the program of the page computes: those of the surface alone.
+OFFERED = (DISPLACEMENT, SURFACE_STRAIN)
 # Nodes inside of a body follow so many nodes of its surface where it is cut open.
 FOLLOWED = 12
 
@@ -67,9 +69,10 @@ def _scene(session: Session, name: str) -> bytes:
     header, arrays = decode(session.scene_message())
     del header["arrays"]
     header["name"], header["title"] = name, title_of(name)
-    offered = [{"name": field.name, "title": field.title} for field in (DISPLACEMENT, SURFACE_STRAIN)]
+    names = {field.name for field in OFFERED}
     for body in header["bodies"]:
-        body["fields"] = offered
+        body["server_fields"] = [field for field in body["fields"] if field["name"] not in names]
+        body["fields"] = [{"name": field.name, "title": field.title} for field in OFFERED]
     return encode(header, {name: (array.dtype.str[1:], array) for name, array in arrays.items()})
 
 

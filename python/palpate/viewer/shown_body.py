@@ -73,6 +73,7 @@ class ShownBody:
             "position": list(self.built.position),
             "orientation": list(self.built.orientation),
             "fields": [{"name": field.name, "title": field.title} for field in self.fields.offered],
+            "server_fields": [],
             "regions": [] if body is None else regions_of(body)[0],
         }
 
@@ -120,6 +121,7 @@ def body_header(name: str, drawn: DrawnSurface, nodes: int, triangles: int) -> d
         "position": [0.0, 0.0, 0.0],
         "orientation": [1.0, 0.0, 0.0, 0.0],
         "fields": [],
+        "server_fields": [],
         "regions": [],
     }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import inspect
+from collections.abc import Callable
 from types import SimpleNamespace
 
 import pytest
@@ -15,6 +16,8 @@ from palpate.cli.impulse import impulse_scene
 from palpate.scene import model_scene
 from palpate.viewer.site import write_site
 from viewer import test_viewer_controls as controls
+from viewer import test_viewer_first_minute as first_minute
+from viewer import test_viewer_look as look
 from viewer import test_viewer_page as pages
 from viewer import test_viewer_page_motion as motion
 from viewer import test_viewer_thin as thin
@@ -22,22 +25,53 @@ from viewer import test_viewer_two_tools as two_tools
 
 pytestmark = MARKS
 
-# The pointer and a setting on their way to the worker and back; the others take the same way.
-QUICK = [
+# Modules whose tests open the page of the paper's liver, and what their tests may ask for.
+MODULES = [controls, first_minute, look, pages]
+FIXTURES = {"capsys", "chromium", "page", "program", "tmp_path"}
+# Tests of the page that a server is needed for, and why.
+NEEDS_SERVER: dict[Callable, str] = {
+    pages.test_an_address_without_the_token_is_explained: "a file server asks for no token",
+    pages.test_a_page_from_another_origin_cannot_connect: "nothing to connect to",
+    pages.test_leaving_the_page_lets_go: "each page has a loop of its own: nobody watches another's",
+    pages.test_fields_have_a_legend: "stresses",
+    pages.test_cut_away_and_another_model: "stresses",
+    look.test_a_range_is_locked_where_it_is_or_where_it_is_typed: "stresses",
+}
+# Of the others these run in every test run.
+QUICK = {
     controls.test_reset_puts_all_sliders_back_at_once,
-    pages.test_a_grab_pulls,
-]
-LONG = [
     pages.test_a_drag_slides_along_the_surface,
+    pages.test_a_grab_pulls,
     pages.test_a_press_begins_at_the_surface_and_comes_to_a_gentle_depth,
     pages.test_the_size_of_the_body_is_told,
-    controls.test_a_number_is_typed_and_a_double_click_brings_the_default,
-    pages.test_deformation_drawn_larger_is_marked,
-    pages.test_felt_stiffness_is_the_slope_of_force_against_depth,
-    pages.test_friction_bounds_the_force_along_the_surface,
-    pages.test_stiffness_scales_the_force_at_once,
-    pages.test_the_depth_is_told_by_wheel_second_button_and_shift,
-]
+}
+
+
+def page_tests() -> list:
+    """Tests of the modules that need no server, each with the first of its parameter sets."""
+    tests = [
+        (test, parameters)
+        for module in MODULES
+        for name, test in vars(module).items()
+        if name.startswith("test_") and test not in NEEDS_SERVER
+        for parameters in [first_parameters(test)]
+        if set(inspect.signature(test).parameters) <= FIXTURES | set(parameters)
+    ]
+    marked = [[] if test in QUICK else [pytest.mark.slow] for test, _ in tests]
+    return [pytest.param(*one, id=one[0].__name__, marks=marks) for one, marks in zip(tests, marked, strict=True)]
+
+
+def first_parameters(test) -> dict:
+    """First set of parameters of a test, by name."""
+    found = {}
+    for mark in getattr(test, "pytestmark", []):
+        if mark.name == "parametrize":
+            names, sets = mark.args[:2]
+            names = [name.strip() for name in names.split(",")] if isinstance(names, str) else names
+            found |= dict(zip(names, sets[0] if len(names) > 1 else [sets[0]], strict=True))
+    return found
+
+
 # Those of scenes of their own, by the name of the scene.
 OTHERS = [
     (thin.test_a_thin_part_is_noticed_while_it_is_pressed, "thin"),
@@ -58,8 +92,8 @@ def served_site(scenes: dict[str, palpate.Scene], cache, folder):
 
 @pytest.fixture(scope="module")
 def site(cache, tmp_path_factory):
-    """The paper's liver, as in the demo."""
-    scenes = {"liver": model_scene("liver", paper=True)}
+    """The paper's liver, as in the demo, and another body to choose."""
+    scenes = {name: model_scene(name, paper=True) for name in ("liver", "beam")}
     with served_site(scenes, cache, tmp_path_factory.mktemp("static") / "site") as address:
         yield address
 
@@ -90,20 +124,30 @@ def program(site):
 
 
 @pytest.fixture
-def page(chromium, program):
-    with opened(chromium, program) as page:
+def page(chromium, program, test):
+    with opened(chromium, program, sharpness=getattr(inspect.getmodule(test), "SHARPNESS", 0.25)) as page:
         yield page
 
 
-@pytest.mark.parametrize("test", QUICK, ids=lambda test: test.__name__)
-def test_of_the_page(page, test):
-    test(page)
+@pytest.mark.campaign(4)
+@pytest.mark.parametrize(("test", "parameters"), page_tests())
+def test_of_the_page(request, test, parameters):
+    wanted = [name for name in inspect.signature(test).parameters if name not in parameters]
+    test(**{name: request.getfixturevalue(name) for name in wanted}, **parameters)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("test", LONG, ids=lambda test: test.__name__)
-def test_of_the_page_that_takes_long(page, test):
-    test(page)
+def test_stresses_are_listed_but_cannot_be_chosen(chromium, program):
+    with opened(chromium, program) as page:
+        options = page.locator("#field option").evaluate_all(
+            "all => all.map(o => [o.value, o.textContent, o.disabled])"
+        )
+    disabled = {name: title for name, title, is_disabled in options if is_disabled}
+    assert disabled == {
+        "von_mises": "Von Mises stress: needs a server",
+        "principal_stress": "First principal stress: needs a server",
+    }
+    assert {"displacement", "strain"} <= {name for name, *_ in options}
 
 
 @pytest.mark.slow

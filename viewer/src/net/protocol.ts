@@ -64,6 +64,8 @@ export interface BodyMessage {
   position: Vec3;
   orientation: Quaternion;
   fields: Choice[];
+  /** Fields that a server alone can show. */
+  server_fields: Choice[];
   /** Empty for a bare store. */
   regions: RegionMessage[];
 }

@@ -38,7 +38,8 @@ export function create<Tag extends keyof HTMLElementTagNameMap>(
 }
 
 /** Lists named things in a select, unless it lists them already. */
-export function list(select: HTMLSelectElement, things: readonly { name: string; title: string }[]): void {
+export function list(select: HTMLSelectElement, things: readonly { name: string; title: string; disabled?: boolean }[]): void {
   if ([...select.options].map(({ value }) => value).join() === things.map(({ name }) => name).join()) return;
-  select.replaceChildren(...things.map(({ name, title }) => new Option(title, name)));
+  const options = things.map(({ name, title, disabled = false }) => Object.assign(new Option(title, name), { disabled }));
+  select.replaceChildren(...options);
 }

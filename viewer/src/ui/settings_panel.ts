@@ -77,10 +77,10 @@ export class SettingsPanel {
 
   /** Fields of the body, and what else may be told apart by colours. */
   private listFields({ scene, body, field, coloring }: Readonly<State>): void {
-    const fields = scene?.bodies[body]?.fields ?? [];
-    const groups = groupings(scene);
-    const offered = [STRAINED, ...fields, ...groups.map((by) => ({ name: GROUPED + by, title: GROUPING_TITLES[by] }))];
-    list(this.field, offered);
+    const { fields = [], server_fields = [] } = scene?.bodies[body] ?? {};
+    const groups = groupings(scene).map((by) => ({ name: GROUPED + by, title: GROUPING_TITLES[by] }));
+    const others = server_fields.map(({ name, title }) => ({ name, title: `${title}: needs a server`, disabled: true }));
+    list(this.field, [STRAINED, ...fields, ...groups, ...others]);
     const shown = fields.find(({ name }) => name === field) ?? fields[0];
     if (coloring === "strained") this.field.value = STRAINED.name;
     else if (coloring !== "field") this.field.value = GROUPED + coloring;

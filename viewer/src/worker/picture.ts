@@ -8,8 +8,9 @@ const LEAST = 0.005;
 /** A range grows at once and comes down with this time constant, s. */
 const DECAY = 0.8;
 
-type Name = "displacement" | "strain";
-const FIELDS: Record<Name, Pick<FieldMessage, "name" | "title" | "unit">> = {
+/** Fields that a page without a server computes. */
+export type FieldName = "displacement" | "strain";
+const FIELDS: Record<FieldName, Pick<FieldMessage, "name" | "title" | "unit">> = {
   displacement: { name: "displacement", title: "Displacement", unit: "mm" },
   strain: { name: "strain", title: "Strain in the surface", unit: "%" },
 };
@@ -30,7 +31,7 @@ export class BodyPicture {
   /** Nodes of the surface and inside of the whole body; of each inner node the surface rows it follows, and how much. */
   private readonly surfaceNodes: Uint32Array;
   private readonly inner: { nodes: Uint32Array; rows: Uint32Array; weights: Float32Array };
-  private readonly ranges = new Map<Name, [number, number]>();
+  private readonly ranges = new Map<FieldName, [number, number]>();
 
   constructor(arrays: Map<string, AnyArray>, body: number, nodesPerFace: number, private readonly size: number) {
     const array = (name: string) => arrays.get(`${body}/${name}`)!;
@@ -44,12 +45,11 @@ export class BodyPicture {
     };
   }
 
-  picture(displacements: Float64Array, wanted: string, max: number | null, cutaway: boolean, nowMs: number): Picture {
-    const name: Name = wanted === "strain" ? "strain" : "displacement";
+  picture(displacements: Float64Array, name: FieldName, max: number | null, cutaway: boolean, nowMs: number): Picture {
     const strains = this.strain.atNodes(displacements);
     const values = name === "strain" ? strains.map((value) => 100 * value) : lengths(displacements);
     const largest = values.reduce((most, value) => Math.max(most, value), 0);
-    const end = name === wanted && max !== null ? Math.max(max, 1e-9) : this.range(name, largest, nowMs);
+    const end = max !== null ? Math.max(max, 1e-9) : this.range(name, largest, nowMs);
     const inside = cutaway && this.inner.nodes.length > 0;
     const [rows, shown] = inside ? this.everywhere(displacements, values) : [pick(displacements, this.drawn, 3), pick(values, this.drawn, 1)];
     const scalar = Uint8Array.from(shown, (value) => Math.round(255 * Math.min(Math.max(value / end, 0), 1)));
@@ -57,7 +57,7 @@ export class BodyPicture {
     return { field, displacements: rows, scalar, interior: inside, strain: strains.reduce((most, s) => Math.max(most, s), 0) };
   }
 
-  private range(name: Name, largest: number, nowMs: number): number {
+  private range(name: FieldName, largest: number, nowMs: number): number {
     const least = name === "strain" ? 100 * LEAST : 1e3 * LEAST * this.size;
     const [before, then] = this.ranges.get(name) ?? [0, nowMs];
     const decayed = largest + (before - largest) * Math.exp((then - nowMs) / (1e3 * DECAY));
@@ -86,6 +86,10 @@ export class BodyPicture {
     });
     return [moved, scalar];
   }
+}
+
+export function isComputed(name: string): name is FieldName {
+  return Object.hasOwn(FIELDS, name);
 }
 
 function lengths(displacements: Float64Array): Float32Array {

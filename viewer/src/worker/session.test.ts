@@ -49,7 +49,7 @@ function pageArrays() {
 
 function sceneMessage(): ArrayBuffer {
   const names = ["nodes", "scalar"];
-  const body = { name: "block", regions: [], fields: [], position: [0, 0, 0], orientation: [1, 0, 0, 0] };
+  const body = { name: "block", regions: [], fields: [], server_fields: [], position: [0, 0, 0], orientation: [1, 0, 0, 0] };
   const arrays = {
     "0/nodes": Float32Array.of(0, 0, 0, 1, 0, 0, 0, 1, 0),
     "tools/0/vertices": Float32Array.of(1, 2, 3),
@@ -167,6 +167,14 @@ describe("the session of a worker", () => {
     session.handle({ type: "press", tool: 0, position: [0, 0, 5], grab: false });
     expect(texts().at(-1)).toMatchObject({ type: "error", text: "press: the position is far away from the body" });
     expect(program.commands).toHaveLength(1);
+  });
+
+  it("refuses a field that it does not compute", () => {
+    const { session, texts } = opened();
+    session.handle({ type: "field", name: "strain" });
+    expect(texts().filter(({ type }) => type === "error")).toEqual([]);
+    session.handle({ type: "field", name: "von_mises" });
+    expect(texts().at(-1)).toEqual({ type: "error", text: expect.stringContaining("'von_mises' needs Palpate") as string });
   });
 
   it("answers what the program refuses by its reason", () => {

@@ -3,7 +3,8 @@
 import { encodeArrays } from "../net/protocol";
 import type { Choice, ClientMessage, MotionFrame, SettingsMessage, ShapeName, Vec3 } from "../net/protocol";
 import { OfferedTools } from "./offered_tools";
-import { BodyPicture } from "./picture";
+import { BodyPicture, isComputed } from "./picture";
+import type { FieldName } from "./picture";
 import type { Program, Tick } from "./program";
 import type { ScenePackage } from "./scene_package";
 import { WatchedNode } from "./watched_node";
@@ -25,7 +26,7 @@ export interface Replies {
 export class WorkerSession {
   private readonly pictures: BodyPicture[];
   private settings: SettingsMessage;
-  private view = { field: "", max: null as number | null, cutaway: false };
+  private view = { field: "displacement" as FieldName, max: null as number | null, cutaway: false };
   private frame = 0;
   /** Whether the page has shown the last frame. */
   private answered = true;
@@ -133,6 +134,7 @@ export class WorkerSession {
         this.view.cutaway = message.on;
         return;
       case "field":
+        if (!isComputed(message.name)) throw new Error(`the field '${message.name}' needs Palpate on this computer: pip install palpate`);
         this.view = { ...this.view, field: message.name, max: message.max ?? null };
         return;
       case "ack":

@@ -25,11 +25,9 @@
 //! an exception: under a patch of one and a half thicknesses a plate bends 10 to 15 % less than under a small contact, and a glued
 //! layer is squeezed less. There the extrapolation counts in part, and fully where the body is as thin as `b`.
 
-use std::sync::Arc;
-
 use glam::DMat3;
 
-use super::local::{SeriesFields, StrainTerms};
+use super::local::StrainTerms;
 use super::smooth::{Blended, Fan, FanWeights, SmoothSurface};
 use super::{
     PatchGeometry, PatchScratch, Refusal, SurfacePoint, TouchPatch, patch_weights, raise_eigenvalues,
@@ -148,8 +146,6 @@ pub fn blend_fields(weights: &FanWeights, fields: &[FanFields], is_hyperelastic:
 pub struct RegularCompliance {
     /// One entry for each fan of the smooth surface.
     pub fields: Vec<FanFields>,
-    /// Higher orders of the displacement at each fan, where they are known.
-    pub series: Option<Arc<[SeriesFields]>>,
 }
 
 /// Data of a body for its regular compliance.
@@ -202,7 +198,7 @@ impl RegularCompliance {
             fields[STRAIN_TERMS].copy_from_slice(&body.moduli.strain_terms[fan.node as usize]);
             fields
         });
-        Self { fields: fields.collect(), series: None }
+        Self { fields: fields.collect() }
     }
 }
 

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use glam::DQuat;
 
 use super::body::BodyModel;
+use super::known_series::KnownSeries;
 use super::tool::ToolModel;
 use super::{MAX_BODIES, MAX_TOOLS};
 use crate::contact::footprint::PressedSurface;
@@ -13,7 +14,8 @@ use crate::contact::{CompliantBody, Concavities, RegularCompliance};
 use crate::memory::Ranges;
 use crate::{Error, Result};
 
-/// Bodies and tools.
+/// Bodies and tools. Copies share the prepared data.
+#[derive(Clone)]
 pub struct Model {
     /// The bodies.
     pub bodies: Vec<BodyModel>,
@@ -38,7 +40,6 @@ impl Model {
         self.bodies.iter().for_each(|body| body.add_memory(&mut ranges));
         for compliance in self.regular_compliances.iter().flatten().flatten() {
             ranges.add(&compliance.fields);
-            compliance.series.iter().for_each(|series| ranges.add(series));
         }
         self.pressed_surfaces.iter().flatten().flatten().for_each(|surface| surface.add_memory(&mut ranges));
         self.concavities.iter().flatten().for_each(|concavities| concavities.add_memory(&mut ranges));
@@ -103,6 +104,18 @@ impl Model {
         Ok(Self { bodies, tools, frames, regular_compliances, pressed_surfaces, concavities })
     }
 
+    /// The same model where a body starts with other higher orders of its displacement: see [`BodyModel::with_series`].
+    ///
+    /// # Errors
+    /// A body that there is not, and as of [`BodyModel::with_series`].
+    pub fn with_series(&self, body: usize, series: Arc<KnownSeries>) -> Result<Self> {
+        let Self { mut bodies, tools, regular_compliances, pressed_surfaces, concavities } = self.clone();
+        let missing = || Error::Invalid(format!("there is no body {body}"));
+        let with_series = bodies.get(body).ok_or_else(missing)?.clone().with_series(series)?;
+        bodies[body] = with_series;
+        Ok(Self { bodies, tools, regular_compliances, pressed_surfaces, concavities })
+    }
+
     /// The regular compliance of such a tool and body, if this model has it.
     fn regular_of(&self, body: &BodyModel, tool: &ToolModel) -> Option<Arc<RegularCompliance>> {
         let body = self.bodies.iter().position(|previous| previous.is_same(body))?;
@@ -148,11 +161,5 @@ fn regular_compliance(body: &BodyModel, tool: &ToolModel) -> Result<Option<Arc<R
     let (smooth, moduli, moves) = (&local.smooth, &local.moduli, body.moves());
     let inverse_sizes = &local.inverse_sizes;
     let compliant = CompliantBody { green, geometry, smooth, moduli, inverse_sizes, moves };
-    let mut regular = RegularCompliance::load_or_compute(compliant, tool.radius, tool.max_stiffness);
-    // A body in motion is displaced by its modes, which are linear.
-    if !moves && !tool.shape.needs_cells() {
-        let of_radius = body.series.iter().find(|(radius, _)| *radius == tool.radius);
-        regular.series = of_radius.map(|(_, series)| series.clone());
-    }
-    Ok(Some(Arc::new(regular)))
+    Ok(Some(Arc::new(RegularCompliance::load_or_compute(compliant, tool.radius, tool.max_stiffness))))
 }

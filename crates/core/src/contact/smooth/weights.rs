@@ -52,6 +52,15 @@ impl<const N: usize> Blended<N> {
         Self { values, slopes: std::array::from_fn(|axis| slopes.map(|slope| slope[axis])) }
     }
 
+    /// Divides a field by a positive number with a gradient.
+    pub fn divide(&mut self, field: usize, (by, slope): (f64, DVec3)) {
+        let value = self.values[field] / by;
+        for (along, slope) in self.slopes.iter_mut().zip(slope.to_array()) {
+            along[field] = (along[field] - value * slope) / by;
+        }
+        self.values[field] = value;
+    }
+
     /// Gradient of a field by the tool's place.
     pub fn slope(&self, field: usize) -> DVec3 {
         DVec3::from_array(self.slopes.map(|along| along[field]))
@@ -128,6 +137,20 @@ impl FanWeights {
     /// Rank of each fan, its weight, and the gradient of that by the place of the tool, 1/m.
     pub fn with_gradients(&self) -> impl Iterator<Item = (usize, f64, DVec3)> + '_ {
         self.iter().zip(&self.gradients).map(|((fan, weight), &gradient)| (fan, weight, gradient))
+    }
+
+    /// Part of the weight on some of the fans, and its gradient; exactly one where it is all.
+    pub fn share(&self, counts: impl Fn(usize) -> bool) -> (f64, DVec3) {
+        let (mut share, mut slope, mut all) = (0.0, DVec3::ZERO, true);
+        for (fan, weight, gradient) in self.with_gradients() {
+            if counts(fan) {
+                share += weight;
+                slope += gradient;
+            } else {
+                all &= weight == 0.0;
+            }
+        }
+        if all { (1.0, DVec3::ZERO) } else { (share, slope) }
     }
 
     /// Fields known at the fans, and their gradients.

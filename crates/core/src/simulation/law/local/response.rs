@@ -6,7 +6,7 @@ use super::half_space::{Fields, HalfSpace, Indentation, LocalBody, LocalTool};
 use super::wrench::{CellMemory, indent_shape, placed_shape};
 use crate::contact::footprint::PressedSurface;
 use crate::contact::local::{
-    Friction, FrictionResponse, HigherOrders, SERIES_FIELDS, WidenedContact, Widening, higher_orders,
+    Friction, FrictionResponse, HigherOrders, SERIES_FIELDS, WidenedContact, Widening, blended_series, higher_orders,
 };
 use crate::contact::regular::{
     COMPLIANCE, GAUSS, MEAN, PLANE_STRAIN, WIDENING, WIDTH, blend_fields, compliance_of, reference_area,
@@ -77,6 +77,8 @@ pub struct LocalResponse {
     pub higher: HigherOrders,
     higher_at_guess: HigherOrders,
     series: Option<Blended<SERIES_FIELDS>>,
+    /// Part of the place where they are known.
+    pub known: f64,
     scale: f64,
     /// Offset of the tool along the surface from above its contact, m, and its distance from the contact, m.
     pub offset: DVec3,
@@ -160,7 +162,10 @@ fn evaluate_sphere(
     };
     *response = LocalResponse::at(body, foot, &fields, indentation);
     response.slope = slope(body, guess.force, others, &fields);
-    response.series = body.series.map(|series| weights.blend(series));
+    if let Some(series) = body.series {
+        let (blended, known) = blended_series(series, weights);
+        (response.series, response.known) = (Some(blended), known);
+    }
     response.distance = distance;
     response.guess = ForceGuess { force: guess.force, friction: guess.friction, offset: guess.offset };
     if response.series.is_some() {
@@ -317,11 +322,6 @@ impl LocalResponse {
             friction_by_position: DMat3::ZERO,
             ..Self::default()
         }
-    }
-
-    /// Whether higher orders of the body's displacement are known.
-    pub fn has_series(&self) -> bool {
-        self.series.is_some()
     }
 
     /// Higher orders of the body's displacement at a force, N.

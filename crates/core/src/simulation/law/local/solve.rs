@@ -323,7 +323,7 @@ fn evaluate_contacts(
             local.footprint.others = other_planes(&state.contacts, slot);
         }
         let tool = state.contacts.slots[slot].tool;
-        let response = local_body(model, state, tool, body).and_then(|surface| {
+        let response = local_body(model, &state.bodies, tool, body).and_then(|surface| {
             let LocalScratch { positions, responses, others, weights, cells, footprint, no_pressures, .. } =
                 &mut *local;
             let contact = &state.contacts.slots[slot].local;

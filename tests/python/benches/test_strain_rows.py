@@ -1,0 +1,37 @@
+"""Rows of `python -m benches strain`: none passes for want of a reference, and no program is missing in silence."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from benches import contact_peers
+from benches.strain import bodies, peers
+from benches.strain.beside import Row, table
+from benches.strain.solid import Solid
+
+
+def test_a_body_without_a_full_solution_is_an_error(monkeypatch, tmp_path):
+    monkeypatch.setattr(bodies, "SOLVED", tmp_path / "forces.json")
+    beam = next(iter(bodies.cuboids()))
+    monkeypatch.setattr(Solid, "pressed", lambda *_: [])
+    with pytest.raises(RuntimeError, match="cantilever: Newton's method does not converge at 5 mm"):
+        beam.full()
+    assert not bodies.SOLVED.exists()
+    monkeypatch.setattr(Solid, "pressed", lambda *_: [0.004])
+    assert np.array_equal(beam.full(), [0.004])
+
+
+def test_depths_without_a_full_solution_are_named():
+    row = Row("beam", 10, [0.005], [0.1], [0.0], [0.0], [0.0], [0.01], [0.01, 0.02])
+    assert table([row]).notes == ["beam: full Newton's method does not converge at 10, 20 mm"]
+    assert table([Row("beam", 10, [0.005], [0.1], [0.0], [0.0], [0.0], [0.01], [])]).notes == []
+
+
+def test_programs_that_take_no_part_are_named(monkeypatch):
+    monkeypatch.setattr(contact_peers, "installed", lambda: ["MuJoCo"])
+    notes = peers.table([peers.PeerRow("MuJoCo", [0.1], 1.0)]).notes
+    assert notes == [
+        "Drake is left out: not installed (pip install drake)",
+        "SOFA is left out: PyPI has no wheel of it",
+    ]
