@@ -109,11 +109,11 @@ impl Model {
     /// # Errors
     /// A body that there is not, and as of [`BodyModel::with_series`].
     pub fn with_series(&self, body: usize, series: Arc<KnownSeries>) -> Result<Self> {
-        let Self { mut bodies, tools, regular_compliances, pressed_surfaces, concavities } = self.clone();
+        let mut model = self.clone();
         let missing = || Error::Invalid(format!("there is no body {body}"));
-        let with_series = bodies.get(body).ok_or_else(missing)?.clone().with_series(series)?;
-        bodies[body] = with_series;
-        Ok(Self { bodies, tools, regular_compliances, pressed_surfaces, concavities })
+        let with_series = model.bodies.get(body).ok_or_else(missing)?.clone().with_series(series)?;
+        model.bodies[body] = with_series;
+        Ok(model)
     }
 
     /// The regular compliance of such a tool and body, if this model has it.
