@@ -244,5 +244,6 @@ pub fn local_body<'a>(model: &'a Model, bodies: &'a [BodyState], tool: usize, bo
         series: series.map(|series| &series.fields[..]),
         pressed_surface: model.pressed_surfaces[tool][body].as_deref(),
         scale: state.stiffness_scale,
+        is_hyperelastic: local.is_hyperelastic,
     })
 }
