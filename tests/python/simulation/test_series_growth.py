@@ -50,9 +50,14 @@ def without_series(built: BuiltScene) -> BuiltScene:
 
 def before_the_series(built: BuiltScene) -> np.ndarray:
     """Press by the law of a loop that knows nothing of the series yet."""
+    return run_as_known(built, path_of_press())
+
+
+def run_as_known(built: BuiltScene, path: np.ndarray) -> np.ndarray:
+    """Move the tool with what is known of the series."""
     simulation = Simulation(built)
     simulation.complete_series = lambda *_: None
-    return simulation.run(path_of_press())
+    return simulation.run(path)
 
 
 def settled_force(simulation: Simulation, place: tuple[float, float, float]) -> float:
@@ -111,3 +116,24 @@ def test_a_recording_has_the_series_that_its_loop_had(beam, tmp_path):
     assert palpate.replay(recording, beam).same
     with pytest.raises(SceneError, match="no series beyond small strain"):
         built_scene_of(recording, without_series(beam))
+
+
+def test_a_closed_path_into_the_unknown_part_gives_out_nothing(beam):
+    """Where the series is known in part the force is the gradient of one energy too."""
+    (known,) = [series for _, series in with_series(beam).bodies[0].series]
+    half = known.only([block < len(known.known) // 2 for block in range(len(known.known))])
+    corners = np.array([[0.085, 0.01, 0.0305], [0.085, 0.01, 0.02], [0.025, 0.012, 0.026], [0.025, 0.012, 0.0305]])
+    shares = np.linspace(0.0, 1.0, 1500, endpoint=False)[:, None]
+    path = np.vstack([a + shares * (b - a) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)])
+    whole, none, partial = (
+        run_as_known(replace(beam, bodies=(replace(beam.bodies[0], series=((RADIUS, series),)),)), path)
+        for series in (known, None, half)
+    )
+    # It goes from one part into the other.
+    pressed = np.linalg.norm(whole, axis=1) > 1e-4
+    same = [np.isclose(partial, other, rtol=0.0, atol=1e-9).all(axis=1)[pressed].mean() for other in (whole, none)]
+    assert min(same) > 0.05 and sum(same) < 0.95
+    steps = np.linalg.norm(np.diff(partial, axis=0), axis=1)
+    assert steps.max() < 1e-2 * np.linalg.norm(partial, axis=1).max()
+    work = np.cumsum((-0.5 * (partial[1:] + partial[:-1]) * np.diff(path, axis=0)).sum(axis=1))
+    assert work.max() > 1e-5 and abs(work[-1]) < 1e-4 * work.max()

@@ -61,6 +61,14 @@ def test_the_page_is_told_what_is_ready_and_what_it_paints_comes_next(scene):
                 message, _ = await client.receive("computed")
                 entry = message["bodies"][0]
             assert entry["done"] == entry["columns"] and entry["waiting"] is None
+            # Then the series of the complete body is computed, and none before.
+            while message["series"] is None:
+                message, _ = await client.receive("computed")
+            while message["series"] is not None:
+                assert message["series"]["stopped"] is None
+                message, _ = await client.receive("computed")
+            ((_, known),) = scene.build(progress=False).bodies[0].series
+            assert known is not None and known.is_complete
             # The loop has taken the store: the corner far from what came first can be pressed.
             await client.say(type="press", tool=0, position=[0.01, 0.01, SIDE + 0.02], grab=False)
             await client.frame_where(lambda header: header["tools"][0]["active"])

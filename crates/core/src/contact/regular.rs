@@ -28,7 +28,7 @@
 use glam::DMat3;
 
 use super::local::StrainTerms;
-use super::smooth::{Fan, SmoothSurface};
+use super::smooth::{Blended, Fan, FanWeights, SmoothSurface};
 use super::{
     PatchGeometry, PatchScratch, Refusal, SurfacePoint, TouchPatch, patch_weights, raise_eigenvalues,
     smallest_eigenvalue,
@@ -129,6 +129,18 @@ pub const WIDTH: usize = 10;
 pub const WIDENING: usize = 11;
 /// Fields of the coefficients of finite strain.
 pub const STRAIN_TERMS: std::ops::Range<usize> = 12..15;
+
+/// Fields blended by the weights of fans. The coefficients of finite strain are read for a hyperelastic body only: all of them are
+/// zero on a linear one. The others fill the processor's vector registers.
+pub fn blend_fields(weights: &FanWeights, fields: &[FanFields], is_hyperelastic: bool) -> Blended<FIELDS> {
+    const LINEAR: usize = STRAIN_TERMS.start;
+    let mut blended = Blended::default();
+    weights.blend_part::<FIELDS, LINEAR>(fields, 0, &mut blended);
+    if is_hyperelastic {
+        weights.blend_part::<FIELDS, { FIELDS - LINEAR }>(fields, LINEAR, &mut blended);
+    }
+    blended
+}
 
 /// Regular compliance of a body for tools of one radius.
 pub struct RegularCompliance {

@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use glam::DQuat;
+
 use super::body::BodyModel;
 use super::known_series::KnownSeries;
 use super::tool::ToolModel;
@@ -19,6 +21,8 @@ pub struct Model {
     pub bodies: Vec<BodyModel>,
     /// The tools, one for each device.
     pub tools: Vec<ToolModel>,
+    /// By body: the rotation from the world into its frame.
+    pub(super) frames: Vec<DQuat>,
     /// By tool and body, for tools under the local law: the compliance of the body beyond the half-space.
     pub(super) regular_compliances: Vec<Vec<Option<Arc<RegularCompliance>>>>,
     /// By tool and body, for such tools that are not spheres: the surface divided into pieces.
@@ -34,6 +38,7 @@ impl Model {
     /// times a second.
     pub fn memory(&self) -> Ranges {
         let mut ranges = Ranges::default();
+        ranges.add(&self.frames);
         self.bodies.iter().for_each(|body| body.add_memory(&mut ranges));
         for compliance in self.regular_compliances.iter().flatten().flatten() {
             ranges.add(&compliance.fields);
@@ -109,7 +114,8 @@ impl Model {
             regular_compliances[rank].iter().map(Option::as_deref).zip(&bodies).map(of_body).collect()
         };
         let corner_surfaces = tools.iter().enumerate().map(corners_of_tool).collect();
-        Ok(Self { bodies, tools, regular_compliances, pressed_surfaces, corner_surfaces, concavities })
+        let frames = bodies.iter().map(|body| DQuat::from_mat3(&body.placement.rotation.transpose())).collect();
+        Ok(Self { bodies, tools, frames, regular_compliances, pressed_surfaces, corner_surfaces, concavities })
     }
 
     /// The same model where a body starts with other higher orders of its displacement: see [`BodyModel::with_series`].
@@ -117,12 +123,11 @@ impl Model {
     /// # Errors
     /// A body that there is not, and as of [`BodyModel::with_series`].
     pub fn with_series(&self, body: usize, series: Arc<KnownSeries>) -> Result<Self> {
-        let Self { mut bodies, tools, regular_compliances, pressed_surfaces, corner_surfaces, concavities } =
-            self.clone();
+        let mut model = self.clone();
         let missing = || Error::Invalid(format!("there is no body {body}"));
-        let with_series = bodies.get(body).ok_or_else(missing)?.clone().with_series(series)?;
-        bodies[body] = with_series;
-        Ok(Self { bodies, tools, regular_compliances, pressed_surfaces, corner_surfaces, concavities })
+        let with_series = model.bodies.get(body).ok_or_else(missing)?.clone().with_series(series)?;
+        model.bodies[body] = with_series;
+        Ok(model)
     }
 
     /// The regular compliance of such a tool and body, if this model has it.

@@ -81,13 +81,19 @@ pub struct ForceError {
     pub held: f64,
 }
 
-/// Estimates the error of a contact's force; zero for a linear material.
-pub fn estimate(tool: &ToolModel, contact: &Contact, response: &LocalResponse, around: &Surroundings) -> ForceError {
+/// Estimates the error of a contact's force; zero for a linear material, whose surroundings are not found.
+pub fn estimate(
+    tool: &ToolModel,
+    contact: &Contact,
+    response: &LocalResponse,
+    surroundings: impl FnOnce() -> Surroundings,
+) -> ForceError {
     let indentation = &response.indentation;
     let material = &indentation.material;
     if material.strain_terms == [0.0; 3] || indentation.force == 0.0 {
         return ForceError { relative: 0.0, held: 1.0 };
     }
+    let around = surroundings();
     let inverse_thickness = around.inverse_thickness;
     let (known, fraction) = (response.known, response.higher.fraction.max(0.0));
     // Above a support the approach of the half-space is larger than the tool's.

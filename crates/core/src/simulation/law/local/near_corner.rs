@@ -37,32 +37,36 @@ pub fn contact_needs_cells(model: &Model, contact: &Contact) -> bool {
     model.tools[contact.tool].shape.needs_cells() || share_of_contact(model, contact) > 0.0
 }
 
-/// Evaluates the response to the tool at a position. `None` where the body is not touchable.
+/// Writes the response to the tool at a position into `response`, without copies of that large struct. `None`, and nothing is
+/// written, where the body is not touchable.
 pub fn evaluate(
     body: LocalBody<'_>,
     tool: LocalTool<'_>,
     contact: &LocalContact,
     guess: Guess<'_>,
     others: OtherContacts,
-    weights: &mut FanWeights,
     cells: CellMemory<'_>,
-) -> Option<LocalResponse> {
+    (weights, response): (&mut FanWeights, &mut LocalResponse),
+) -> Option<()> {
     // Set again with each foot.
     weights.touchable = 1.0;
-    let mut response = match (body.pressed_surface, body.corners) {
-        (Some(pressed), _) => evaluate_shape((body, pressed), tool, contact, guess, others, weights, cells),
+    match (body.pressed_surface, body.corners) {
+        (Some(pressed), _) => {
+            evaluate_shape((body, pressed), tool, contact, guess, others, cells, (weights, response))?;
+        }
         (None, Some(corners)) => {
             let share = share_of_cells(body.corners, contact.is_fading, guess.foot.triangle, guess.place);
             if share.0 > 0.0 {
                 let at = (body, corners, share);
-                return evaluate_near_corner(at, tool, contact, guess, others, weights, cells);
+                *response = evaluate_near_corner(at, tool, contact, guess, others, weights, cells)?;
+                return Some(());
             }
-            evaluate_sphere(body, tool, contact, guess, others, weights)
+            evaluate_sphere(body, tool, contact, guess, others, (weights, response))?;
         }
-        (None, None) => evaluate_sphere(body, tool, contact, guess, others, weights),
-    }?;
+        (None, None) => evaluate_sphere(body, tool, contact, guess, others, (weights, response))?,
+    }
     response.find_force(tool, contact, guess.place, others);
-    Some(response)
+    Some(())
 }
 
 /// Evaluates the response of a sphere of which a share is on cells. `None` where the body is not touchable.
@@ -79,7 +83,9 @@ fn evaluate_near_corner(
     let turned = LocalContact { orientation: AXES, ..*contact };
     let mut on_cells = |weights: &mut FanWeights, unused: &mut FanWeights| {
         let cells = CellMemory { state, scratch, footprint, resolution, corner_weights: unused };
-        let mut response = evaluate_shape((body, &corners.pressed), tool, &turned, guess, others, weights, cells)?;
+        let mut response = LocalResponse::default();
+        let at = (body, &corners.pressed);
+        evaluate_shape(at, tool, &turned, guess, others, cells, (weights, &mut response))?;
         // A sphere that turns stays the same.
         (response.indentation.torque, response.turn) = (DVec3::ZERO, DVec3::ZERO);
         response.foot.turning = bounded(response.foot.turning, 1.0 / tool.radius);
@@ -94,7 +100,8 @@ fn evaluate_near_corner(
         response.find_force(tool, contact, guess.place, others);
         return Some(response);
     }
-    let sphere = evaluate_sphere(body, tool, contact, guess, others, weights)?;
+    let mut sphere = LocalResponse::default();
+    evaluate_sphere(body, tool, contact, guess, others, (weights, &mut sphere))?;
     corner_weights.touchable = 1.0;
     let Some(on_cells) = on_cells(corner_weights, weights) else {
         weights.touchable = corner_weights.touchable;

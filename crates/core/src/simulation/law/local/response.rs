@@ -8,7 +8,9 @@ use crate::contact::footprint::PressedSurface;
 use crate::contact::local::{
     Friction, FrictionResponse, HigherOrders, SERIES_FIELDS, WidenedContact, Widening, blended_series, higher_orders,
 };
-use crate::contact::regular::{COMPLIANCE, GAUSS, MEAN, PLANE_STRAIN, WIDENING, WIDTH, compliance_of, reference_area};
+use crate::contact::regular::{
+    COMPLIANCE, GAUSS, MEAN, PLANE_STRAIN, WIDENING, WIDTH, blend_fields, compliance_of, reference_area,
+};
 use crate::contact::shape::ToolShape;
 use crate::contact::smooth::{Blended, FanWeights, FootPoint};
 use crate::math::hypot;
@@ -122,8 +124,8 @@ pub(super) fn evaluate_sphere(
     contact: &LocalContact,
     guess: Guess<'_>,
     others: OtherContacts,
-    weights: &mut FanWeights,
-) -> Option<LocalResponse> {
+    (weights, response): (&mut FanWeights, &mut LocalResponse),
+) -> Option<()> {
     let foot = match contact.is_fading {
         true => contact.foot.frozen(guess.place),
         false => body.smooth.foot(body.drawn, guess.place - guess.offset, guess.foot, &mut weights.near)?,
@@ -136,13 +138,13 @@ pub(super) fn evaluate_sphere(
     if weights.is_outside() {
         return None;
     }
-    let fields = weights.blend(body.fields);
+    let fields = blend_fields(weights, body.fields, body.is_hyperelastic);
     // A new contact has no force: its approach counts from the present depth.
     let indentation = match contact.is_new {
         true => Indentation::default(),
         false => indent(body, tool, contact, (&foot, distance), &fields),
     };
-    let mut response = LocalResponse::at(body, foot, &fields, indentation);
+    *response = LocalResponse::at(body, foot, &fields, indentation);
     response.slope = slope(body, guess.force, others, &fields);
     if let Some(series) = body.series {
         let (blended, known) = blended_series(series, weights);
@@ -156,7 +158,7 @@ pub(super) fn evaluate_sphere(
         response.slope += higher.slope;
         response.slope_by_force = compliance_slope(body, guess.force, &fields) + higher.slope_by_force;
     }
-    Some(response)
+    Some(())
 }
 
 /// The response of a tool on pressure cells without its force.
@@ -166,9 +168,9 @@ pub(super) fn evaluate_shape(
     contact: &LocalContact,
     guess: Guess<'_>,
     others: OtherContacts,
-    weights: &mut FanWeights,
     cells: CellMemory<'_>,
-) -> Option<LocalResponse> {
+    (weights, response): (&mut FanWeights, &mut LocalResponse),
+) -> Option<()> {
     let Guess { place, force, .. } = guess;
     let shape = placed_shape(tool.shape, contact, place);
     cells.footprint.near.find(pressed, body.drawn.query, &shape);
@@ -176,7 +178,7 @@ pub(super) fn evaluate_shape(
     let Some(footprint) = footprint else {
         // The tool is away from the body: no force.
         let compliance = DMat3::ZERO;
-        return Some(LocalResponse {
+        *response = LocalResponse {
             foot: contact.foot,
             compliance,
             jacobian: DMat3::ZERO,
@@ -184,12 +186,13 @@ pub(super) fn evaluate_shape(
             offset_by_position: DMat3::ZERO,
             friction_by_position: DMat3::ZERO,
             ..LocalResponse::default()
-        });
+        };
+        return Some(());
     };
     if weights.is_outside() {
         return None;
     }
-    let fields = weights.blend(&pressed.fields);
+    let fields = blend_fields(weights, &pressed.fields, body.is_hyperelastic);
     let half_space = HalfSpace::new(body, tool, &fields, contact.part);
     // Gradients by the tool's rotation of `E*`, of the width, and of `f^T C_reg f / 2`.
     let motion_turn = others.motion_turn.map_or(DVec3::ZERO, |motion_turn| motion_turn * force);
@@ -210,10 +213,10 @@ pub(super) fn evaluate_shape(
         (&half_space, [modulus_turns, width_turns]),
         cells,
     );
-    let mut response = LocalResponse::at(body, footprint.foot(place), &fields, indentation);
+    *response = LocalResponse::at(body, footprint.foot(place), &fields, indentation);
     response.point = place + indentation.lever;
     (response.slope, response.turn) = (slope(body, force, others, &fields), compliance_turns);
-    Some(response)
+    Some(())
 }
 
 /// Force on the tool from the gradients of the body's compliance and of its motion, N. It is computed from the guessed force, which
@@ -257,7 +260,7 @@ fn indent(
     let rate_slope = fields.slope(WIDENING) / body.scale;
     let widening = Widening { rate: fields.values[WIDENING] / body.scale, reference: reference_area(tool.radius) };
     let WidenedContact { sphere, energy_by_modulus, energy_by_rate, energy_by_terms } =
-        widening.indent(depth, radius, half_space.modulus, &half_space.strain_terms);
+        widening.indent(depth, radius, half_space.modulus, body.is_hyperelastic.then_some(&half_space.strain_terms));
     let by_terms: DVec3 = half_space.strain_slopes.iter().zip(energy_by_terms).map(|(&slope, by)| slope * by).sum();
     let gradient = radius_slope * sphere.energy_by_radius
         + half_space.slope * energy_by_modulus
@@ -281,6 +284,7 @@ fn indent(
 
 impl LocalResponse {
     /// At a foot, without a force.
+    #[inline(always)]
     fn at(body: LocalBody<'_>, foot: FootPoint, fields: &Fields, indentation: Indentation) -> Self {
         let compliance = compliance_of(&fields.values) * (1.0 / body.scale);
         let (normal, point) = (foot.normal, foot.position);

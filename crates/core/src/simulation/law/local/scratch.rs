@@ -248,5 +248,6 @@ pub fn local_body<'a>(model: &'a Model, bodies: &'a [BodyState], tool: usize, bo
         pressed_surface: model.pressed_surfaces[tool][body].as_deref(),
         corners: model.corner_surfaces[tool][body].as_deref(),
         scale: state.stiffness_scale,
+        is_hyperelastic: local.is_hyperelastic,
     })
 }

@@ -165,6 +165,7 @@ mod tests {
                 pressed_surface: Some(&pressed),
                 corners: None,
                 scale: 1.0,
+                is_hyperelastic: true,
             };
             let tool = LocalTool { shape, radius: shape.bounding_radius(), pad: None, coefficient: 0.0 };
             let mut contact = LocalContact { orientation, part: 1.0, ..LocalContact::default() };
@@ -195,7 +196,10 @@ mod tests {
                     corner_weights: &mut corner_weights,
                 };
                 let others = OtherContacts::default();
-                response = evaluate(body, tool, &contact, guess, others, &mut weights, cells).expect("an answer");
+                let mut evaluated = LocalResponse::default();
+                evaluate(body, tool, &contact, guess, others, cells, (&mut weights, &mut evaluated))
+                    .expect("an answer");
+                response = evaluated;
                 (contact.foot, contact.penetration) = (response.foot, response.indentation.depth);
             }
             response
