@@ -22,7 +22,7 @@ TOLERANCE = 1e-3
 DEPTHS = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0)
 QUICK_DEPTHS = [pytest.param(part, marks=[] if part in (0.5, 2.0, 4.0) else [pytest.mark.slow]) for part in DEPTHS]
 CLEAR = 1e-3
-# Most that is lost over an edge or a corner of the block at each of these depths, as measured with a margin: it must not grow.
+# Most that is lost over an edge or a corner of the block at these depths, as measured with a margin: it must not grow.
 # A tool deeper than about its radius snaps off, a sphere always.
 LOST = {
     "sphere": (0.86, 0.82, 0.80, 0.78, 0.76, 0.75),
