@@ -267,7 +267,7 @@ def info(
     """
     from palpate.dynamics import ModalBasis
     from palpate.green import GreensFunction
-    from palpate.green.series import series_beside, series_line
+    from palpate.green.series import lines_of_series, series_line
     from palpate.mesh import TetMesh
     from palpate.scene import Scene
 
@@ -284,8 +284,8 @@ def info(
         print(f"{file}: {_green_line(green)}")
         print(f"  {_precision_line(green)}")
         _print_origin(green.description, green.key)
-        for series in series_beside(file):
-            print(f"  {series.name}: {series_line(series)}")
+        for line in lines_of_series(file):
+            print(f"  {line}")
         return
     if file.suffix == ".toml":
         scene = Scene.read(file)

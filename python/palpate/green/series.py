@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import glob
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +12,7 @@ import numpy as np
 from palpate import _native
 from palpate.body import Body, problem_arrays
 from palpate.body.material import element_laws
+from palpate.errors import StoreError
 from palpate.green.claim import claimed
 from palpate.green.function import GreensFunction
 
@@ -122,6 +123,15 @@ def force_series(
 def series_beside(store: Path) -> list[Path]:
     """Files of series that lie beside a store."""
     return sorted(store.parent.glob(f"{glob.escape(store.stem)}.*.series.palpate"))
+
+
+def lines_of_series(store: Path) -> Iterator[str]:
+    """Lines about the files of series beside a store, for people; one that cannot be read says why."""
+    for path in series_beside(store):
+        try:
+            yield f"{path.name}: {series_line(path)}"
+        except StoreError as error:
+            yield str(error)
 
 
 def series_line(path: Path) -> str:

@@ -16,7 +16,7 @@ import pytest
 
 import palpate
 from palpate.green.background_series import BackgroundSeries
-from palpate.green.series import SeriesJob
+from palpate.green.series import SeriesJob, lines_of_series, series_beside, series_line
 from palpate.mesh import TetMesh
 from palpate.validation.verify.grids import box
 
@@ -110,6 +110,21 @@ def test_a_changed_byte_is_refused(job, whole):
         assert file.load() is None
     file.path.write_bytes(right)
     assert same(file.load(), whole)
+
+
+def test_a_file_is_described(job, whole):
+    compute_some(job, 3)
+    begun = job.file().load()
+    (path,) = series_beside(job.store)
+    if begun is not None and not begun.is_complete:
+        assert f"{begun.done} of {whole.places} places" in series_line(path)
+    job.compute()
+    assert f"all {whole.places} places" in series_line(path)
+    path.write_bytes(path.read_bytes()[:-1])
+    with pytest.raises(palpate.StoreError, match="damaged"):
+        series_line(path)
+    (line,) = lines_of_series(job.store)
+    assert "damaged" in line
 
 
 def test_two_processes_compute_one_file(job, whole):
