@@ -22,6 +22,7 @@ function growing() {
         { ready, done: 12, columns: 60_000, left_s: 30, region: null, waiting: null, stopped: null },
         { ready: null, done: 24, columns: 24, left_s: 0, region: null, waiting: null, stopped: null },
       ],
+      series: null,
     },
   });
   return { store, sent, painting };
@@ -67,7 +68,7 @@ describe("painting", () => {
     const { store, painting } = growing();
     const [body, other] = store.get().computed!.bodies;
     const masks = { region: maskOfNodes([0, 5, 6, 7], COUNT), waiting: maskOfNodes([5, 6], COUNT), ready: maskOfNodes([5], COUNT) };
-    store.update({ computed: { type: "computed", bodies: [{ ...body!, ...masks }, other!] } });
+    store.update({ computed: { type: "computed", bodies: [{ ...body!, ...masks }, other!], series: null } });
     painting.add([Uint32Array.of(0, 6, 8), new Uint32Array(0)]);
     const states = touchStates(store.get(), 0)!;
     expect([0, 5, 6, 7, 8].map((node) => states[node])).toEqual([PAINTED, READY, WAITING, NOT_READY, NOT_TOUCHABLE]);

@@ -1,8 +1,9 @@
 //! Adding, replacing and removing bodies, tools and devices of a simulation, also while its loop runs.
 
-use std::sync::PoisonError;
+use std::sync::{Arc, PoisonError};
+use std::time::Duration;
 
-use palpate_core::simulation::PreviousRanks;
+use palpate_core::simulation::{MAX_BODIES, MAX_TOOLS, PreviousRanks};
 use palpate_core::{Error, Result};
 use palpate_devices::simulated::{Target, simulated};
 use palpate_devices::{Device, DeviceLimits, MountedDevice, Workspace};
@@ -14,8 +15,13 @@ use crate::connection::{
 };
 use crate::errors::to_python;
 use crate::scene::{BodyArguments, ToolArguments, scene_body, scene_tool};
+use crate::series::Series;
 use crate::simulation::{RunningParts, SimulationCore};
 use crate::strain::StrainMeasure;
+
+/// Interval between two polls for a tick, and most polls.
+const POLL_INTERVAL: Duration = Duration::from_millis(1);
+const MAX_POLLS: u32 = 1000;
 
 /// Gives a tool a device for the next start, or at once where the loop runs.
 #[pyfunction]
@@ -116,6 +122,52 @@ pub fn replace_body(py: Python<'_>, core: &SimulationCore, rank: usize, body: Bo
     core.change_nodes(py, |scene| scene.replace_body(body_at(scene, rank)?, body))
 }
 
+/// Gives a body higher orders of its displacement below spheres of a radius, m. A running loop takes them up as soon as they change no
+/// force. Whether there was room for them: a loop that ticks makes room.
+#[pyfunction]
+pub fn set_series(py: Python<'_>, core: &SimulationCore, body: usize, radius: f64, series: &Series) -> PyResult<bool> {
+    let _alone = core.changing(py);
+    let series = py.detach(|| series.for_loop(radius));
+    let mut parts = core.parts(py);
+    let id = body_at(&parts.scene, body).map_err(|e| to_python(py, e))?;
+    let model = parts.prepared.model.with_series(body, series.clone()).map_err(|e| to_python(py, e))?;
+    let before = std::mem::replace(&mut parts.prepared.model, Arc::new(model));
+    let earlier = before.bodies[body].series().iter().filter(|earlier| earlier.radius == series.radius);
+    parts.earlier_series.extend(earlier.map(|earlier| (id, earlier.radius, earlier.blocks.clone())));
+    parts.scene.set_series(id, series.clone());
+    Ok(parts.servo.as_mut().is_none_or(|servo| servo.offer_series(body, series)))
+}
+
+/// Has a running loop take up no more series, or go on taking them. Which blocks of places each tool has of each body: tool, body, and
+/// whether each block is known; nothing where none is.
+#[pyfunction]
+pub fn hold_series(py: Python<'_>, core: &SimulationCore, held: bool) -> Vec<(usize, usize, Vec<bool>)> {
+    let mut first = None;
+    for _ in 0..MAX_POLLS {
+        let mut parts = core.parts(py);
+        let Some(servo) = &mut parts.servo else { break };
+        servo.hold_series(held);
+        let status = servo.latest().status;
+        // A tick that has begun before may still take some.
+        if status.ticks >= *first.get_or_insert(status.ticks + 2) || !held {
+            return parts.known_blocks(&status.series_blocks);
+        }
+        drop(parts);
+        py.detach(|| std::thread::sleep(POLL_INTERVAL));
+    }
+    Vec::new()
+}
+
+/// Positions (m) of the tools that are in the scene of a running loop, by tool.
+#[pyfunction]
+pub fn tool_positions(py: Python<'_>, core: &SimulationCore) -> Vec<(usize, [f64; 3])> {
+    let mut parts = core.parts(py);
+    let tools = parts.prepared.model.tools.len();
+    let Some(servo) = &mut parts.servo else { return Vec::new() };
+    let readings = servo.latest().status.readings[..tools].iter().enumerate();
+    readings.filter(|(_, reading)| reading.active).map(|(tool, at)| (tool, at.pose.position.to_array())).collect()
+}
+
 /// Removes a body.
 #[pyfunction]
 pub fn remove_body(py: Python<'_>, core: &SimulationCore, rank: usize) -> PyResult<u64> {
@@ -204,6 +256,23 @@ impl SimulationCore {
 }
 
 impl RunningParts {
+    /// The series of which so many blocks are known, for each tool and body that has some.
+    fn known_blocks(&self, counts: &[[u32; MAX_BODIES]; MAX_TOOLS]) -> Vec<(usize, usize, Vec<bool>)> {
+        let PreparedScene { model, bodies, .. } = &self.prepared;
+        let mut found = Vec::new();
+        for (tool, fixed) in model.tools.iter().enumerate() {
+            for (body, id) in bodies.iter().enumerate() {
+                let now = model.bodies[body].series().iter().map(|series| (series.radius, &series.blocks));
+                let earlier = self.earlier_series.iter().filter(|(of, ..)| of == id);
+                let mut all = now.chain(earlier.map(|(_, radius, blocks)| (*radius, blocks)));
+                let count = |blocks: &[bool]| blocks.iter().filter(|known| **known).count() as u32;
+                let given = all.find(|(radius, blocks)| *radius == fixed.radius && count(blocks) == counts[tool][body]);
+                found.extend(given.map(|(_, blocks)| (tool, body, blocks.clone())));
+            }
+        }
+        found
+    }
+
     /// The device of a tool: the one that is connected, or a simulated one at its target, with the limits that the scene gives it.
     pub(crate) fn device_of(&self, tool: usize, connected: Option<Connected>) -> LoopDevice {
         if let Some(Connected { device, scheduler, .. }) = connected {

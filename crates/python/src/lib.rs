@@ -26,6 +26,7 @@ mod sensor;
 mod series;
 mod simulation;
 mod strain;
+mod strain_law;
 mod surface;
 
 /// The module `palpate._native`.
@@ -37,8 +38,8 @@ mod _native {
     use crate::body::{determinant_ranges, mass, stiffness, volumes};
     #[pymodule_export]
     use crate::changes::{
-        add_body, add_tool, assume_devices, connect, device_limits, disconnect, place_body, remove_body, remove_tool,
-        replace_body, set_strain_measures, tool_stiffness,
+        add_body, add_tool, assume_devices, connect, device_limits, disconnect, hold_series, place_body, remove_body,
+        remove_tool, replace_body, set_series, set_strain_measures, tool_positions, tool_stiffness,
     };
     #[pymodule_export]
     use crate::children::end_with_parent;
@@ -69,15 +70,17 @@ mod _native {
     #[pymodule_export]
     use crate::rerun::rerun;
     #[pymodule_export]
-    use crate::scene::{checksum, strain_terms};
+    use crate::scene::checksum;
     #[pymodule_export]
     use crate::sensor::SensorCore;
     #[pymodule_export]
-    use crate::series::series;
+    use crate::series::{Series, SeriesFile};
     #[pymodule_export]
     use crate::simulation::SimulationCore;
     #[pymodule_export]
     use crate::strain::{StrainMeasure, StrainResponse, contact_patch, provisional_displacement};
+    #[pymodule_export]
+    use crate::strain_law::strain_terms;
     #[pymodule_export]
     use crate::surface::SurfaceSearch;
 

@@ -1,14 +1,14 @@
 //! Conversion of scene arguments from Python, and of what is read back.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use glam::DQuat;
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use palpate_core::contact::Moduli;
-use palpate_core::contact::local::StrainLaw;
 use palpate_core::contact::shape::ToolShape;
 use palpate_core::dynamics::Energy;
-use palpate_core::simulation::{Contact, LawKind, Mode, Model, Pose, Snapshot};
+use palpate_core::simulation::{Contact, KnownSeries, LawKind, Mode, Model, Pose, Snapshot};
 use palpate_core::{Error, Result};
 use palpate_devices::DeviceLimits;
 pub use palpate_scene::unit_quaternion as quaternion;
@@ -20,6 +20,7 @@ use pyo3::types::PyDict;
 use crate::dynamics::{SchemeArguments, scheme};
 use crate::errors::to_python;
 use crate::green::GreenCore;
+use crate::series::Series;
 
 /// Eigenvalues (m), their shapes at the surface dofs (3s, m), the scheme, whether each mode is integrated exactly instead,
 /// and the spring between tools and patches, N/m.
@@ -29,14 +30,14 @@ pub type DynamicsArguments<'py> = (PyReadonlyArray1<'py, f64>, PyReadonlyArray2<
 pub type ModuliArguments<'py> =
     (PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>, Option<PyReadonlyArray2<'py, f64>>, bool);
 /// Green's function, position (m), orientation (unit quaternion w x y z), what moves the body, its elastic constants, and series by the
-/// radius of tools, m.
+/// radius of tools, m; `None` where nothing is known yet.
 pub type BodyArguments<'py> = (
     PyRef<'py, GreenCore>,
     [f64; 3],
     [f64; 4],
     Option<DynamicsArguments<'py>>,
     Option<ModuliArguments<'py>>,
-    Vec<(f64, PyReadonlyArray2<'py, f64>)>,
+    Vec<(f64, Option<PyRef<'py, Series>>)>,
 );
 /// What a tool looks like: a kind and its lengths in m, three at most; of a surface vertices and triangles.
 pub type ShapeArguments = (String, [f64; 3], Vec<[f64; 3]>, Vec<[u32; 3]>);
@@ -69,30 +70,12 @@ pub fn scene_body(arguments: &BodyArguments<'_>) -> PyResult<Body> {
         })
         .transpose()?;
     let placement = placement(*position, *orientation);
-    let of_radius = |(radius, fields): &(f64, PyReadonlyArray2<'_, f64>)| -> PyResult<_> {
-        Ok((*radius, fields.as_slice()?.as_chunks().0.into()))
+    let of_radius = |(radius, series): &(f64, Option<PyRef<'_, Series>>)| match series {
+        Some(series) => series.for_loop(*radius),
+        None => Arc::new(KnownSeries::new(*radius, vec![], vec![])),
     };
-    let series = series.iter().map(of_radius).collect::<PyResult<_>>()?;
+    let series = series.iter().map(of_radius).collect();
     Ok(Body { name: String::new(), green: green.green.clone(), placement, moduli, motion, strain: None, series })
-}
-
-/// A law by its name and two ratios of its constants.
-pub fn strain_law(name: &str, first: f64, second: f64) -> Option<StrainLaw> {
-    Some(match name {
-        "linear" => StrainLaw::Linear,
-        "neo-hookean" => StrainLaw::NeoHookean,
-        "mooney-rivlin" => StrainLaw::MooneyRivlin { share: first },
-        "yeoh" => StrainLaw::Yeoh { quadratic: first, cubic: second },
-        _ => return None,
-    })
-}
-
-/// Coefficients of a sphere's contact at finite strain of a material, by its law, two ratios of its constants and Poisson's ratio;
-/// `None` outside of the table.
-#[pyfunction]
-pub fn strain_terms(law: &str, first: f64, second: f64, poisson: f64) -> Option<[f64; 3]> {
-    let law = strain_law(law, first, second)?;
-    law.is_known(poisson).then(|| palpate_core::contact::local::strain_terms(&law, poisson))
 }
 
 /// Hex BLAKE3 hash, as a packed scene names it.

@@ -1,18 +1,21 @@
 //! Taylor series of bodies beyond small strain.
 
 use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
 
+use glam::DVec3;
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use palpate_core::Error;
 use palpate_core::contact::local::{SERIES_FIELDS, StrainLaw};
-use palpate_core::series::SeriesFile;
+use palpate_core::series;
+use palpate_core::simulation::KnownSeries;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
 use crate::errors::to_python;
 use crate::green::problem;
 use crate::interruptible::run_interruptible;
-use crate::scene::strain_law;
+use crate::strain_law::strain_law;
 
 /// Laws by name and ratios (k), and the law of each element (m).
 pub type LawArguments<'py> = (Vec<(String, f64, f64)>, PyReadonlyArray1<'py, u32>);
@@ -27,32 +30,123 @@ fn laws((known, of_element): &LawArguments<'_>) -> palpate_core::Result<Vec<Stra
     of_element.as_array().iter().map(law).collect()
 }
 
-/// Coefficients and positions of the fans.
-type SeriesArrays<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
+/// Coefficients of the higher orders of a body's displacement for spheres of one radius, as far as they are computed.
+#[pyclass(frozen, module = "palpate._native")]
+pub struct Series {
+    series: series::Series,
+}
 
-/// Coefficients (fans, 8) of the higher orders of a body's displacement for tools of a radius, m, and positions (fans, 3), m, from the
-/// file beside its store. If there is none, it is computed and written; `progress` is called with places done and all of them.
-#[pyfunction]
-#[pyo3(signature = (arguments, law_arguments, radius, store, green_key, progress=None))]
-pub fn series<'py>(
-    py: Python<'py>,
-    arguments: &Bound<'py, PyTuple>,
-    law_arguments: LawArguments<'py>,
+impl Series {
+    /// For the loop.
+    pub(crate) fn for_loop(&self, radius: f64) -> Arc<KnownSeries> {
+        Arc::new(KnownSeries::new(radius, self.series.at_fans(), self.series.known.clone()))
+    }
+}
+
+#[pymethods]
+impl Series {
+    /// Reads any file of series, of whatever body.
+    #[staticmethod]
+    fn read(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        let read = py.detach(|| series::SeriesFile::read(&path));
+        read.map(|series| Self { series }).map_err(|e| to_python(py, e))
+    }
+
+    /// Coefficients (fans, 9) at the smooth sides of the surface nodes; zero where they are not known.
+    #[getter]
+    fn fields<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let fields = py.detach(|| self.series.at_fans());
+        let fans = fields.len();
+        fields.into_flattened().into_pyarray(py).reshape([fans, SERIES_FIELDS])
+    }
+
+    /// Positions (fans, 3) of the sides, m.
+    #[getter]
+    fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let sides = &self.series.layout.sides;
+        let positions: Vec<f64> = sides.iter().flat_map(|side| side.position.to_array()).collect();
+        positions.into_pyarray(py).reshape([sides.len(), 3])
+    }
+
+    /// How many places are known.
+    #[getter]
+    fn done(&self) -> usize {
+        self.series.done()
+    }
+
+    /// How many places there are.
+    #[getter]
+    fn places(&self) -> usize {
+        self.series.layout.places.len()
+    }
+
+    /// Whether all places are known.
+    #[getter]
+    fn is_complete(&self) -> bool {
+        self.series.is_complete()
+    }
+
+    /// Whether each block of places is known.
+    #[getter]
+    fn known(&self) -> Vec<bool> {
+        self.series.known.clone()
+    }
+
+    /// The same series with only some of its blocks; `None` if it has not all of them.
+    fn only(&self, known: Vec<bool>) -> Option<Self> {
+        self.series.only(&known).map(|series| Self { series })
+    }
+}
+
+/// The file of a series.
+#[pyclass(frozen, module = "palpate._native")]
+pub struct SeriesFile {
+    file: series::SeriesFile,
+    laws: Vec<StrainLaw>,
     radius: f64,
-    store: PathBuf,
-    green_key: &str,
-    progress: Option<Py<PyAny>>,
-) -> PyResult<SeriesArrays<'py>> {
-    let laws = laws(&law_arguments).map_err(|e| to_python(py, e))?;
-    let file = SeriesFile::beside(&store, green_key, &laws, radius);
-    let found = match file.load() {
-        Some(found) => found,
-        None => {
-            let problem = problem(arguments)?;
-            run_interruptible(py, 0, progress.as_ref(), |note| file.compute(&problem, &laws, radius, note))?
-        }
-    };
-    let fans = found.fields.len();
-    let fields = found.fields.into_flattened().into_pyarray(py).reshape([fans, SERIES_FIELDS])?;
-    Ok((fields, found.positions.into_flattened().into_pyarray(py).reshape([fans, 3])?))
+    near: Mutex<Option<DVec3>>,
+}
+
+#[pymethods]
+impl SeriesFile {
+    /// Beside the store of a body with such a key, for spheres of a radius, m.
+    #[new]
+    fn new(
+        py: Python<'_>,
+        law_arguments: LawArguments<'_>,
+        radius: f64,
+        store: PathBuf,
+        green_key: &str,
+    ) -> PyResult<Self> {
+        let laws = laws(&law_arguments).map_err(|e| to_python(py, e))?;
+        let file = series::SeriesFile::beside(&store, green_key, &laws, radius);
+        Ok(Self { file, laws, radius, near: Mutex::new(None) })
+    }
+
+    /// Its path.
+    #[getter]
+    fn path(&self) -> PathBuf {
+        self.file.path().to_owned()
+    }
+
+    /// Has the places near a point, m, be computed first from now on.
+    fn set_near(&self, point: [f64; 3]) {
+        *self.near.lock().unwrap_or_else(PoisonError::into_inner) = Some(point.into());
+    }
+
+    /// What is stored, complete or not; `None` for a file that is missing, damaged or of another body.
+    fn load(&self, py: Python<'_>) -> Option<Series> {
+        py.detach(|| self.file.load()).map(|series| Series { series })
+    }
+
+    /// Computes and stores what is not stored yet; `progress` is called with the known places and all of them.
+    #[pyo3(signature = (arguments, progress=None))]
+    fn compute(&self, py: Python<'_>, arguments: &Bound<'_, PyTuple>, progress: Option<Py<PyAny>>) -> PyResult<Series> {
+        let problem = problem(arguments)?;
+        let near = || *self.near.lock().unwrap_or_else(PoisonError::into_inner);
+        let given = (&problem, &self.laws[..]);
+        let computed =
+            run_interruptible(py, 0, progress.as_ref(), |note| self.file.compute(given, self.radius, &near, note));
+        computed.map(|series| Series { series })
+    }
 }

@@ -8,7 +8,7 @@ use glam::DVec3;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use palpate_core::simulation::{MAX_BODIES, Strike};
 use palpate_devices::simulated::{Handle, Target};
-use palpate_scene::{PreparedScene, Scene};
+use palpate_scene::{BodyId, PreparedScene, Scene};
 use palpate_servo::{SafetyLimits, Scheduling, Script, Servo, Settings, TickRecord};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
@@ -47,6 +47,8 @@ pub(crate) struct RunningParts {
     /// Raised whenever bodies or tools change: a frame states of which it is.
     pub number: u64,
     pub servo: Option<Servo>,
+    /// Blocks of series that a loop may still have: body, radius (m), which blocks.
+    pub earlier_series: Vec<(BodyId, f64, Vec<bool>)>,
     recording: Option<Recording>,
 }
 
@@ -80,6 +82,7 @@ impl SimulationCore {
             targets: vec![Target::default(); prepared.tools.len()],
             number: 0,
             servo: None,
+            earlier_series: Vec::new(),
             recording: None,
             scene,
             prepared,

@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use glam::{DMat3, DQuat};
 use palpate_core::Result;
-use palpate_core::contact::{Moduli, SeriesFields};
+use palpate_core::contact::Moduli;
 use palpate_core::dynamics::{Integration, ModalModel, Newmark, Rayleigh};
 use palpate_core::green::GreensFunction;
-use palpate_core::simulation::{BodyDynamics, BodyModel, Placement};
+use palpate_core::simulation::{BodyDynamics, BodyModel, KnownSeries, Placement};
 use palpate_core::strain::StrainMeasure;
 
 use crate::store_defaults::moduli_of_store;
@@ -57,8 +57,8 @@ pub struct Body {
     pub motion: Option<Motion>,
     /// How its strain is measured; without it, it is not limited.
     pub strain: Option<Arc<StrainMeasure>>,
-    /// Higher orders of its displacement by the radius of spheres, m; without them contacts have those of a half-space.
-    pub series: Vec<(f64, Arc<[SeriesFields]>)>,
+    /// Higher orders of its displacement by the radius of spheres; without them contacts have those of a half-space.
+    pub series: Vec<Arc<KnownSeries>>,
 }
 
 impl Body {
@@ -88,8 +88,8 @@ impl Body {
         let mut body = BodyModel::new(self.green.clone(), self.placement)?;
         if let Some(moduli) = &self.moduli {
             body = body.with_moduli(moduli.clone())?;
-            for (radius, series) in &self.series {
-                body = body.with_series(*radius, series.clone())?;
+            for series in &self.series {
+                body = body.with_series(series.clone())?;
             }
         }
         match &self.motion {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use palpate_core::simulation::{MAX_BODIES, MAX_TOOLS, Placement};
+use palpate_core::simulation::{KnownSeries, MAX_BODIES, MAX_TOOLS, Placement};
 use palpate_core::strain::StrainMeasure;
 use palpate_core::{Error, Result};
 use palpate_devices::DeviceLimits;
@@ -133,6 +133,16 @@ impl Scene {
     /// Gives a body a measure of its strain; false if there is none of that handle.
     pub fn set_strain_measure(&mut self, id: BodyId, measure: Arc<StrainMeasure>) -> bool {
         self.body_mut(id).map(|body| body.strain = Some(measure)).is_some()
+    }
+
+    /// Gives a body higher orders of its displacement; false if there is none of that handle.
+    pub fn set_series(&mut self, id: BodyId, series: Arc<KnownSeries>) -> bool {
+        self.body_mut(id)
+            .map(|body| {
+                body.series.retain(|known| known.radius != series.radius);
+                body.series.push(series);
+            })
+            .is_some()
     }
 
     /// Moves a body; false if there is none of that handle.

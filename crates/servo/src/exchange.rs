@@ -31,6 +31,11 @@ impl<In, Out> ExchangeEnd<In, Out> {
         if self.outgoing.is_full() { None } else { self.incoming.pop().ok() }
     }
 
+    /// Whether what is sent out finds room.
+    pub fn has_room(&self) -> bool {
+        !self.outgoing.is_full()
+    }
+
     /// Sends something out, once for what was taken.
     pub fn give_back(&mut self, replaced: Out) {
         let _ = self.outgoing.push(replaced);

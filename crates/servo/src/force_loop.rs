@@ -280,6 +280,7 @@ impl ForceLoop {
         (record.settings, record.reset, record.strike) = (self.settings, reset, controls.strike);
         record.strain = StrainArrivals::default();
         self.ends.strain.receive(&mut self.state, &mut record.strain);
+        self.ends.series.receive(&self.model, &mut self.state);
         if controls.reset {
             self.fault = self.fault.filter(|fault| fault.outlasts_reset());
             self.timing.reset();
@@ -347,6 +348,11 @@ impl ForceLoop {
         (status.settings, status.limited) = (self.settings, output.limited);
         status.fault = fault(self.fault, &self.stages);
         status.recording = self.ends.recorder.progress();
+        for (tool, blocks) in self.model.tools.iter().zip(&mut status.series_blocks) {
+            for (body, blocks) in self.state.bodies.iter().zip(blocks) {
+                *blocks = body.series(tool.radius).map_or(0, |series| series.known_blocks);
+            }
+        }
         let mut row = LogRow {
             time: status.time,
             position: status.readings[0].pose.position,

@@ -7,7 +7,7 @@
 
 use std::sync::Arc;
 
-use palpate_core::simulation::{Model, Snapshot, Strike};
+use palpate_core::simulation::{KnownSeries, Model, Snapshot, Strike};
 use palpate_core::{Error, Result};
 use rtrb::{Consumer, Producer, RingBuffer};
 use triple_buffer::{Input, Output, triple_buffer};
@@ -17,6 +17,7 @@ use crate::log::{LogRow, Status};
 use crate::record::TickRecord;
 use crate::recorder::{RecorderEnd, RecorderHandle, recorder_ends};
 use crate::safety::SafetyStage;
+use crate::series::{SeriesEnd, SeriesHandle, series_ends};
 use crate::settings::Settings;
 use crate::strain::{PreparerEnd, StrainEnd, strain_ends};
 
@@ -38,6 +39,7 @@ pub(crate) struct LoopEnds {
     pub published: Input<Published>,
     pub rows: Producer<LogRow>,
     pub strain: StrainEnd,
+    pub series: SeriesEnd,
     pub recorder: RecorderEnd,
 }
 
@@ -49,6 +51,7 @@ pub struct LoopHandle {
     rows: Consumer<LogRow>,
     /// The end of the thread that prepares strain responses.
     strain: Option<PreparerEnd>,
+    series: SeriesHandle,
     recorder: RecorderHandle,
 }
 
@@ -65,15 +68,23 @@ pub(crate) fn handoffs(
     let (published_in, published_out) = triple_buffer(&first);
     let (producer, consumer) = RingBuffer::new(log_rows);
     let (strain, preparer) = strain_ends();
+    let (series, series_handle) = series_ends();
     let (recorder_end, recorder) = recorder_ends(stages);
-    let ends =
-        LoopEnds { commands: command_end, published: published_in, rows: producer, strain, recorder: recorder_end };
+    let ends = LoopEnds {
+        commands: command_end,
+        published: published_in,
+        rows: producer,
+        strain,
+        series,
+        recorder: recorder_end,
+    };
     let handle = LoopHandle {
         model: model.clone(),
         commands,
         published: published_out,
         rows: consumer,
         strain: Some(preparer),
+        series: series_handle,
         recorder,
     };
     (ends, handle)
@@ -106,6 +117,17 @@ impl LoopHandle {
         self.commands.strike(&self.model, strike)
     }
 
+    /// Offers higher orders of the displacement of a body, which the loop takes up once they change no force; whether there was room.
+    /// Wait-free.
+    pub fn offer_series(&mut self, body: usize, series: Arc<KnownSeries>) -> bool {
+        self.series.offer(body, series)
+    }
+
+    /// Has series that are offered wait, or not any more: while they wait, a recording's ticks have those that it began with.
+    pub fn hold_series(&mut self, held: bool) {
+        self.series.hold(held);
+    }
+
     /// Whether settings and resets are refused until the loop ticks.
     pub(crate) fn is_full(&self) -> bool {
         self.commands.is_full()
@@ -133,9 +155,9 @@ impl LoopHandle {
 
     /// Switches to the loop that has replaced this one's. Log and commands continue in the same rings.
     pub(crate) fn switch_to(&mut self, next: LoopHandle) {
-        let Self { model, published, strain, recorder, .. } = next;
+        let Self { model, published, strain, series, recorder, .. } = next;
         (self.model, self.published) = (model, published);
-        (self.strain, self.recorder) = (strain, recorder);
+        (self.strain, self.series, self.recorder) = (strain, series, recorder);
     }
 
     /// Has the loop push no more records; what is in the ring stays.

@@ -25,6 +25,7 @@ mod replay;
 mod safety;
 mod scheduling;
 mod self_check;
+mod series;
 mod servo;
 mod settings;
 mod statistics;

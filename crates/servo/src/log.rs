@@ -52,6 +52,8 @@ pub struct Status {
     pub realtime: RealtimeStatus,
     /// How far a recording has come.
     pub recording: RecordingProgress,
+    /// Blocks of places at which each tool has the higher orders of each body's displacement.
+    pub series_blocks: [[u32; MAX_BODIES]; MAX_TOOLS],
 }
 
 impl Status {

@@ -114,6 +114,7 @@ impl RecorderEnd {
                     for (new, old) in beginning.stages.iter_mut().zip(&*stages) {
                         old.fault().into_iter().for_each(|fault| new.latch(fault));
                     }
+                    state.swap_series(&mut beginning.state);
                     std::mem::swap(state, &mut beginning.state);
                     std::mem::swap(stages, &mut beginning.stages);
                     std::mem::swap(&mut self.records, &mut beginning.records);

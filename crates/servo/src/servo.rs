@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use palpate_core::simulation::{Model, PreviousRanks};
+use palpate_core::simulation::{KnownSeries, Model, PreviousRanks};
 use palpate_core::{Error, Result};
 use palpate_devices::{Device, DeviceFault, DeviceLimits, Reading, Scheduler, Wrench};
 
@@ -19,6 +19,7 @@ use crate::platform::{lock, sleep_until_ns};
 use crate::preparer::{StrainPreparer, StrainWorker};
 use crate::safety::SafetyLimits;
 use crate::scheduling::Scheduling;
+use crate::series::memory_of;
 use crate::settings::Settings;
 
 /// Interval between two polls, and most polls: for the end of a recording, and for room for another change.
@@ -132,6 +133,14 @@ impl Servo {
     pub fn set(&mut self, settings: Settings) -> Result<()> {
         self.wait_for_room();
         self.handle.set(settings)
+    }
+
+    /// See [`LoopHandle::offer_series`]; their memory is locked as the loop's is.
+    pub fn offer_series(&mut self, body: usize, series: Arc<KnownSeries>) -> bool {
+        if self.realtime.locked_memory {
+            lock(memory_of(&series));
+        }
+        self.handle.offer_series(body, series)
     }
 
     /// See [`LoopHandle::reset`].

@@ -61,7 +61,7 @@ impl Timing {
         let by_computing = took_ns / period_ns;
         status.missed_computing += by_computing;
         status.missed_waking += (self.delay_ns() + took_ns) / period_ns - by_computing;
-        self.overruns = if by_computing > 0 { self.overruns + 1 } else { 0 };
+        self.overruns = if by_computing > 0 { self.overruns.saturating_add(1) } else { 0 };
         let overrun = took_ns as f64 > 1e9 * limits.max_compute || self.overruns >= limits.max_overruns;
         (took_ns, overrun.then_some(FaultReason::Overrun))
     }
@@ -95,12 +95,21 @@ mod tests {
 
     /// A tick that is due now, begins `late_us` later and takes `took_us`.
     fn tick(timing: &mut Timing, status: &mut Status, late_us: u64, took_us: u64) -> Option<FaultReason> {
+        limited_tick(timing, status, &SafetyLimits::default(), (late_us, took_us))
+    }
+
+    fn limited_tick(
+        timing: &mut Timing,
+        status: &mut Status,
+        limits: &SafetyLimits,
+        (late_us, took_us): (u64, u64),
+    ) -> Option<FaultReason> {
         let due_ns = now();
         NOW.with(|now| now.set(due_ns + 1000 * late_us));
         timing.begin(due_ns);
         NOW.with(|now| now.set(now.get() + 1000 * took_us));
         timing.account(status);
-        let (took_ns, overrun) = timing.end(PERIOD, &SafetyLimits::default(), status);
+        let (took_ns, overrun) = timing.end(PERIOD, limits, status);
         assert_eq!(took_ns, 1000 * took_us);
         overrun
     }
@@ -128,5 +137,14 @@ mod tests {
         }
         (0..19).for_each(|_| assert_eq!(tick(&mut timing, &mut status, 0, 1100), None));
         assert_eq!(tick(&mut timing, &mut status, 0, 1100), Some(FaultReason::Overrun));
+    }
+
+    #[test]
+    fn ticks_of_any_time_are_counted_as_missed_alone() {
+        let (mut timing, mut status) = timing();
+        let limits = SafetyLimits::default().of_any_tick_time();
+        limits.check().unwrap();
+        (0..30).for_each(|_| assert_eq!(limited_tick(&mut timing, &mut status, &limits, (0, 200_000)), None));
+        assert_eq!(status.missed_computing, 30 * 200);
     }
 }

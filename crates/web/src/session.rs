@@ -205,8 +205,8 @@ impl Recording {
 fn start(scene: &PreparedScene) -> Result<(PacedLoop, Vec<(Handle, Target)>)> {
     let (handles, devices): (Vec<_>, Vec<_>) = scene.devices.iter().map(device_of).unzip();
     let period = 1.0 / scene.scheduling.rate;
-    let paced =
-        PacedLoop::new(scene.model.clone(), devices, scene.limits, scene.settings, scene.strain.clone(), period)?;
+    let limits = scene.limits.of_any_tick_time();
+    let paced = PacedLoop::new(scene.model.clone(), devices, limits, scene.settings, scene.strain.clone(), period)?;
     Ok((paced, handles.into_iter().map(|handle| (handle, Target::default())).collect()))
 }
 

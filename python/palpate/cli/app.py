@@ -267,6 +267,7 @@ def info(
     """
     from palpate.dynamics import ModalBasis
     from palpate.green import GreensFunction
+    from palpate.green.series import lines_of_series, series_line
     from palpate.mesh import TetMesh
     from palpate.scene import Scene
 
@@ -275,11 +276,16 @@ def info(
         print(f"{file}: {len(basis)} modes, {basis.frequencies[0]:.4g} to {basis.frequencies[-1]:.4g} Hz")
         _print_origin(basis.description, basis.key)
         return
+    if file.name.endswith(".series.palpate"):
+        print(f"{file}: {series_line(file)}")
+        return
     if file.suffix == ".palpate":
         green = GreensFunction.load(file)
         print(f"{file}: {_green_line(green)}")
         print(f"  {_precision_line(green)}")
         _print_origin(green.description, green.key)
+        for line in lines_of_series(file):
+            print(f"  {line}")
         return
     if file.suffix == ".toml":
         scene = Scene.read(file)

@@ -233,6 +233,8 @@ def _bare(
     from palpate.body.default_support import lowest_part
     from palpate.mesh import size_text
     from palpate.scene import BuiltScene, Scene
+    from palpate.scene.build import marked_as_growing
+    from palpate.scene.series import with_stored_series
 
     defaults = []
     unit = options.unit
@@ -265,6 +267,7 @@ def _bare(
     of_loop = {name: getattr(options, name) for name in OF_LOOP}
     of_run = RunOptions(radius=options.radius, **of_loop)
     built = BuiltScene.of(scene_with(scene, of_run), body, green)
+    built = with_stored_series(marked_as_growing(built, growing or {}))
     if options.radius is None:
         defaults.append(f"tool of radius {1e3 * built.scene.tools[0].radius:.3g} mm (--radius)")
     print(f"{file}: {size_text(high - low)}" + (f"; by default {', '.join(defaults)}" if defaults else ""))

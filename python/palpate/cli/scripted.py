@@ -11,6 +11,7 @@ import numpy as np
 
 from palpate.scene import BuiltScene
 from palpate.scene.press_place import press_place
+from palpate.scene.series import with_whole_series
 from palpate.simulation import Frame, Simulation
 
 # Pointer rate of a person's mouse, Hz: the simulated device smooths it as it would theirs.
@@ -61,6 +62,8 @@ def scripted_press(built: BuiltScene, seconds: float, recording: Path | None = N
 
     A tool that a device moves goes where the hand on it does.
     """
+    # The same press has the same forces each time.
+    built = with_whole_series(built, True)
     rest, depth = press_place(built)
     logs, depths, sampled = [], [], []
     limited: list[Frame] = []

@@ -2,14 +2,92 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import glob
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from palpate import _native
 from palpate.body import Body, problem_arrays
 from palpate.body.material import element_laws
+from palpate.errors import StoreError
+from palpate.green.claim import claimed
 from palpate.green.function import GreensFunction
+
+
+@dataclass(frozen=True)
+class SeriesJob:
+    """The series of a body for spheres of one radius: what it is of, and its file.
+
+    Attributes
+    ----------
+    body
+        What it is of.
+    radius
+        m.
+    touchable
+        Surface nodes at which it is known, ascending.
+    store, key
+        File and key of the body's Green's function.
+
+    """
+
+    body: Body
+    radius: float
+    touchable: np.ndarray
+    store: Path
+    key: str
+
+    @classmethod
+    def of(cls, green: GreensFunction, body: Body, radius: float) -> SeriesJob | None:
+        """Return the job of a body; None for a linear one, one with loads and one whose store has no file."""
+        if green.path is None or body.loads is not None or not body.is_hyperelastic:
+            return None
+        return cls(body, radius, green.touchable_nodes, green.path, green.key)
+
+    @property
+    def laws(self) -> tuple[list[tuple[str, float, float]], np.ndarray]:
+        """Laws and the law of each element, as the native module takes them."""
+        return element_laws(self.body.mesh, self.body.material)
+
+    @property
+    def problem(self) -> tuple[np.ndarray, ...]:
+        """The problem as the native module takes it."""
+        return problem_arrays(self.body, self.touchable)
+
+    def file(self) -> _native.SeriesFile:
+        """Return the file."""
+        return _native.SeriesFile(self.laws, self.radius, self.store, self.key)
+
+    def compute(self, progress: Callable[[int, int], None] | None = None) -> _native.Series:
+        """Read the series from its file, and compute and store what is missing there.
+
+        One process at a time computes it, the others wait.
+
+        Raises
+        ------
+        BodyError
+            A body that is not held.
+
+        """
+        file = self.file()
+
+        def wait() -> None:
+            stored = file.load()
+            if progress is not None and stored is not None:
+                progress(stored.done, stored.places)
+
+        stored = file.load()
+        if stored is not None and stored.is_complete:
+            return stored
+        try:
+            with claimed(file.path, wait):
+                return file.compute(self.problem, progress)
+        except OSError:
+            # No file can be written there: the result is the same.
+            return file.compute(self.problem, progress)
 
 
 def force_series(
@@ -35,7 +113,36 @@ def force_series(
         (docs/theory.md, chapter 11).
 
     """
-    if green.path is None or body.loads is not None or not body.is_hyperelastic:
+    job = SeriesJob.of(green, body, radius)
+    if job is None:
         return None
-    problem = problem_arrays(body, green.touchable_nodes)
-    return _native.series(problem, element_laws(body.mesh, body.material), radius, green.path, green.key, progress)
+    series = job.compute(progress)
+    return series.fields, series.positions
+
+
+def series_beside(store: Path) -> list[Path]:
+    """Files of series that lie beside a store."""
+    return sorted(store.parent.glob(f"{glob.escape(store.stem)}.*.series.palpate"))
+
+
+def lines_of_series(store: Path) -> Iterator[str]:
+    """Lines about the files of series beside a store, for people; one that cannot be read says why."""
+    for path in series_beside(store):
+        try:
+            yield f"{path.name}: {series_line(path)}"
+        except StoreError as error:
+            yield str(error)
+
+
+def series_line(path: Path) -> str:
+    """One line about a file of series, for people.
+
+    Raises
+    ------
+    StoreError
+        A file that is damaged or of another version.
+
+    """
+    series = _native.Series.read(path)
+    done = "all" if series.is_complete else f"{series.done:,} of"
+    return f"series beyond small strain at {done} {series.places:,} places, {path.stat().st_size / 1e6:.2g} MB"

@@ -5,12 +5,12 @@ from __future__ import annotations
 import contextlib
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from palpate import models
+from palpate import _native, models
 from palpate.body import Body, parse
 from palpate.errors import Error, SceneError, UnclearUnitError
 from palpate.green import BackgroundPrecompute, GreensFunction, precompute, require_precise
@@ -51,7 +51,10 @@ class BuiltBody:
     position, orientation
         Of its own frame in the scene: m, and a unit quaternion w x y z.
     series
-        Coefficients (k, 7) of its displacement beyond small strain by the radius of a sphere, m.
+        Its displacement beyond small strain by the radius of a sphere, m: as far as it is known, None where nothing is
+        known yet. Empty for a body that stays linear below its contacts.
+    is_growing
+        Whether more of its Green's function is being computed.
 
     """
 
@@ -61,7 +64,8 @@ class BuiltBody:
     name: str = "body"
     position: tuple[float, float, float] = (0.0, 0.0, 0.0)
     orientation: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
-    series: tuple[tuple[float, np.ndarray], ...] = ()
+    series: tuple[tuple[float, _native.Series | None], ...] = ()
+    is_growing: bool = False
 
     @property
     def is_hyperelastic(self) -> bool:
@@ -112,6 +116,14 @@ def build(
     """See :meth:`palpate.Scene.build`, and with ``growing`` :meth:`palpate.Scene.build_first`."""
     builders = [_Builder(scene, rank, growing, progress, announce) for rank in range(len(scene.bodies))]
     return BuiltScene(scene, tuple(builder.build(progress, modes_progress) for builder in builders))
+
+
+def marked_as_growing(built: BuiltScene, growing: Mapping[int, BackgroundPrecompute]) -> BuiltScene:
+    """Mark the bodies that are still being computed."""
+    bodies = list(built.bodies)
+    for rank, background in growing.items():
+        bodies[rank] = replace(bodies[rank], is_growing=not background.is_complete)
+    return replace(built, bodies=tuple(bodies))
 
 
 def mesh_of_body(scene: SceneTables, rank: int = 0) -> TetMesh:

@@ -12,10 +12,10 @@ from pydantic import ValidationError
 from palpate.errors import SceneError
 from palpate.green import BackgroundPrecompute
 from palpate.input_file import read_toml
-from palpate.scene.build import BuiltScene, build, require_files
+from palpate.scene.build import BuiltScene, build, marked_as_growing, require_files
 from palpate.scene.early import Expected
 from palpate.scene.mistakes import explain, located
-from palpate.scene.series import with_series
+from palpate.scene.series import with_stored_series
 from palpate.scene.tables import BodyTable, SceneTables
 
 
@@ -125,7 +125,7 @@ class Scene(SceneTables):
             A mesh that cannot be read or made, supports that leave it free to move, a store that does not match.
 
         """
-        return with_series(build(self, progress, modes_progress, announce=announce), progress)
+        return with_stored_series(build(self, progress, modes_progress, announce=announce))
 
     def build_first(
         self,
@@ -145,8 +145,7 @@ class Scene(SceneTables):
         growing: dict[int, BackgroundPrecompute] = {}
         try:
             built = build(self, progress, None, growing, announce)
-            # While columns are computed, their processes have the processor.
-            return (built if growing else with_series(built, progress)), growing
+            return with_stored_series(marked_as_growing(built, growing)), growing
         except BaseException:
             for background in growing.values():
                 background.close()

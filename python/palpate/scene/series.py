@@ -5,9 +5,25 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from palpate.green.series import force_series
+from palpate import _native
+from palpate.green.series import SeriesJob
 from palpate.progress import progress_reporter
 from palpate.scene.build import BuiltBody, BuiltScene
+
+TITLE = "series beyond small strain"
+
+
+def series_jobs(body: BuiltBody, radii: list[float]) -> list[SeriesJob]:
+    """Series of a body below spheres of some radii, m; none of a body that moves, or has no series."""
+    if body.body is None or body.motion is not None:
+        return []
+    jobs = [SeriesJob.of(body.green, body.body, radius) for radius in radii]
+    return [job for job in jobs if job is not None]
+
+
+def sphere_radii(built: BuiltScene) -> list[float]:
+    """Radii, m, of the spheres of a scene that press under the local law."""
+    return sorted({float(t.radius) for t in built.scene.tools if t.contact == "local" and t.shape == "sphere"})
 
 
 def with_series(built: BuiltScene, progress: bool | Callable[[int, int], None] = False) -> BuiltScene:
@@ -22,17 +38,38 @@ def with_series(built: BuiltScene, progress: bool | Callable[[int, int], None] =
         A body that is not held.
 
     """
-    radii = sorted({float(t.radius) for t in built.scene.tools if t.contact == "local" and t.shape == "sphere"})
-    return replace(built, bodies=tuple(_with_series(body, radii, progress) for body in built.bodies))
+    radii = sphere_radii(built)
+    return _with(built, lambda _: radii, lambda job: _computed(job, progress))
 
 
-def _with_series(body: BuiltBody, radii: list[float], progress: bool | Callable[[int, int], None]) -> BuiltBody:
-    if body.body is None or body.motion is not None:
-        return body
-    found = []
-    for radius in radii:
-        with progress_reporter("series beyond small strain", progress) as report:
-            series = force_series(body.green, body.body, radius, report)
-        if series is not None:
-            found.append((radius, series[0]))
-    return replace(body, series=tuple(found))
+def with_whole_series(built: BuiltScene, progress: bool | Callable[[int, int], None] = False) -> BuiltScene:
+    """Complete the series of bodies that have series, as of :func:`with_series`."""
+    return _with(built, lambda body: [radius for radius, _ in body.series], lambda job: _computed(job, progress))
+
+
+def with_stored_series(built: BuiltScene) -> BuiltScene:
+    """Give hyperelastic bodies what is stored of their series: a simulation computes the rest beside its loop."""
+    radii = sphere_radii(built)
+    return _with(built, lambda _: radii, stored_series)
+
+
+def stored_series(job: SeriesJob) -> _native.Series | None:
+    """Return what is stored of a series."""
+    return job.file().load()
+
+
+def _computed(job: SeriesJob, progress: bool | Callable[[int, int], None]) -> _native.Series:
+    with progress_reporter(TITLE, progress) as report:
+        return job.compute(report)
+
+
+def _with(
+    built: BuiltScene,
+    radii: Callable[[BuiltBody], list[float]],
+    find: Callable[[SeriesJob], _native.Series | None],
+) -> BuiltScene:
+    def of_body(body: BuiltBody) -> BuiltBody:
+        jobs = series_jobs(body, radii(body))
+        return replace(body, series=tuple((job.radius, None if body.is_growing else find(job)) for job in jobs))
+
+    return replace(built, bodies=tuple(map(of_body, built.bodies)))

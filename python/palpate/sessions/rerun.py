@@ -49,6 +49,7 @@ def rerun(
     if simulation.scene.device.rate != rate:
         raise SceneError(f"the recording has {rate:g} ticks a second, the scene {simulation.scene.device.rate:g}")
     simulation._arm_strain_limit()
+    simulation.complete_series(progress)
     expected = ticks_before_gap(recorded)
     now = simulation._about(shown_of(about), clock=False)
     with progress_reporter("running again", progress) as report:

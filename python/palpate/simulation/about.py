@@ -11,10 +11,11 @@ from typing import Any
 from palpate import _native
 from palpate.errors import SceneError
 from palpate.scene import BuiltBody, BuiltScene, Scene
+from palpate.scene.series import sphere_radii
 from palpate.scene.tables import SceneTables
 
 # Raised when what is recorded, or what follows from it, changes.
-FORMAT = 3
+FORMAT = 4
 
 
 def about(
@@ -33,7 +34,7 @@ def about(
         "folder": str(scene.folder.absolute()),
         "bodies": json.dumps([body.name for body in bodies]),
         "keys": json.dumps(keys),
-        "series": json.dumps([[radius for radius, _ in body.series] for body in bodies]),
+        "series": series_text([[(radius, known.known) for radius, known in body.series if known] for body in bodies]),
         "rate": repr(scene.device.rate),
         "tools": str(len(scene.tools)),
         "devices": json.dumps(devices),
@@ -116,13 +117,45 @@ def require_same(about: dict[str, str], built: BuiltScene) -> None:
 
 
 def with_recorded_series(about: dict[str, str], built: BuiltScene) -> BuiltScene:
-    """Leave out the series that the recorded loop had not; one that the page drove may have begun without them."""
+    """Leave out what the recorded loop did not know of the series: it may have begun before all was computed.
+
+    Raises
+    ------
+    SceneError
+        A series that lacks what was known then.
+
+    """
     recorded = json.loads(about.get("series", "[]")) or [[] for _ in built.bodies]
-    bodies = [
-        replace(body, series=tuple((radius, fields) for radius, fields in body.series if radius in radii))
-        for body, radii in zip(built.bodies, recorded, strict=True)
-    ]
+    radii = sphere_radii(built)
+    bodies = []
+    for body, of_body in zip(built.bodies, recorded, strict=True):
+        # Before format 4 a series was known as a whole, or not at all.
+        blocks = dict(entry if isinstance(entry, list) else (entry, None) for entry in of_body)
+        # A scene with other tools has other series.
+        blocks = {radius: text for radius, text in blocks.items() if radius in radii}
+        known = dict(body.series)
+        series = tuple((radius, _part(body, known.get(radius), text)) for radius, text in blocks.items())
+        bodies.append(replace(body, series=series))
     return replace(built, bodies=tuple(bodies))
+
+
+def series_text(known: Sequence[Sequence[tuple[float, Sequence[bool]]]]) -> str:
+    """Text about the series of each body: radius, m, and which blocks of places are known."""
+    return json.dumps([[[radius, "".join("01"[has] for has in blocks)] for radius, blocks in of] for of in known])
+
+
+def _part(body: BuiltBody, known: _native.Series | None, blocks: str | None) -> _native.Series | None:
+    """Return the recorded part of a series, by a digit for each block; None where nothing was known."""
+    if blocks is not None and "1" not in blocks:
+        return None
+    wanted = None if blocks is None else [digit == "1" for digit in blocks]
+    part = known if known is None or wanted is None else known.only(wanted)
+    if part is None:
+        raise SceneError(
+            f"'{body.name}' has no series beyond small strain like the one of the recording: give the scene as it was "
+            "then, and let its series be computed"
+        )
+    return part
 
 
 def measured_by_surface(about: Mapping[str, str]) -> bool:

@@ -52,8 +52,7 @@ def body_arguments(body: BuiltBody, local: bool) -> tuple[Any, ...]:
     if motion is not None:
         shapes = motion.basis.shapes[body.green.surface_nodes].reshape(-1, len(motion.basis))
         moving = (motion.basis.eigenvalues, np.ascontiguousarray(shapes), motion.scheme, motion.exact, motion.coupling)
-    series = [(radius, np.ascontiguousarray(fields)) for radius, fields in body.series]
-    return body.green._core, body.position, body.orientation, moving, _moduli(body, local), series
+    return body.green._core, body.position, body.orientation, moving, _moduli(body, local), list(body.series)
 
 
 def _moduli(body: BuiltBody, needed: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray | None, bool] | None:

@@ -17,6 +17,7 @@ from palpate.errors import SceneError, SimulationError
 from palpate.green import GreensFunction, precompute
 from palpate.scene import BuiltBody, BuiltScene, Scene, ToolTable
 from palpate.scene.devices import KINDS, device_change, tables_of_tools
+from palpate.scene.series import with_stored_series
 from palpate.scene.tables import BodyTable, SceneTables
 from palpate.simulation.arguments import body_arguments, tool_arguments
 from palpate.simulation.connecting import connect_tool, require_devices, warn_if_limited
@@ -79,9 +80,13 @@ class SceneEditing:
         place = _placed(table.position if position is None else position, table.orientation, orientation)
         built, table = replace(built, position=place[0], orientation=place[1]), _moved(table, place)
         scene = self.scene.model_copy(update={"bodies": [*self.scene.bodies, table]})
+        if built.series:
+            # Of the tools here, not of those of its own scene.
+            built = with_stored_series(BuiltScene(scene, (*self.bodies, built))).bodies[-1]
         measure = self._strain_measure_of(built) if self._armed else None
         arguments = body_arguments(built, _needs_moduli(scene))
         self._take(scene, (*self.bodies, built), lambda: _native.add_body(self._core, arguments, measure))
+        self._continue_series()
         return len(self.bodies) - 1
 
     @one_at_a_time
@@ -122,10 +127,11 @@ class SceneEditing:
         self._take(scene, tuple(bodies), lambda: _native.place_body(self._core, body, *place))
 
     @one_at_a_time
-    def take_store(self, body: int, green: GreensFunction) -> None:
+    def take_store(self, body: int, green: GreensFunction, is_growing: bool = False) -> None:
         """Go on with another store of a body, in which more of the same surface may be touched.
 
-        Contacts go on; those on nodes that have left the touch region are released.
+        Contacts go on; those on nodes that have left the touch region are released. ``is_growing`` if yet another store
+        is being computed.
 
         Raises
         ------
@@ -134,9 +140,10 @@ class SceneEditing:
 
         """
         bodies = list(self.bodies)
-        bodies[body] = replace(bodies[self._body(body)], green=green)
+        bodies[body] = replace(bodies[self._body(body)], green=green, is_growing=is_growing)
         arguments = body_arguments(bodies[body], _needs_moduli(self.scene))
         self._take(self.scene, tuple(bodies), lambda: _native.replace_body(self._core, body, arguments))
+        self._continue_series()
 
     @one_at_a_time
     def add_tool(self, device: str | Device = "simulated", **table: Any) -> int:
@@ -240,6 +247,13 @@ class SceneEditing:
         self._number = None
         self.scene, self.bodies = scene, bodies
         self._number = number
+        self._offer_series()
+
+    def _offer_series(self) -> None:
+        raise NotImplementedError
+
+    def _continue_series(self) -> None:
+        raise NotImplementedError
 
     def _tool(self, tool: int) -> int:
         raise NotImplementedError

@@ -22,6 +22,7 @@ from palpate.atomic import folder_beside
 from palpate.errors import SceneError
 from palpate.green import GreensFunction
 from palpate.scene import BuiltBody, BuiltScene, Scene
+from palpate.scene.series import with_whole_series
 from palpate.scene.tables import SceneTables
 from palpate.simulation.arguments import body_arguments, tool_arguments
 from palpate.simulation.connecting import largest_force
@@ -72,6 +73,7 @@ def describe(
 
     What contact needs is written for the tools of ``others`` too, scenes of the same bodies.
     """
+    built = with_whole_series(built, True)
     scene, device = built.scene, built.scene.device
     local = any(tool.contact == "local" for tool in scene.tools)
     bodies, described = [], []
@@ -129,7 +131,7 @@ def _body(body: BuiltBody, arguments: tuple[Any, ...], store: Path, path: Path, 
             arrays["strain_terms"] = terms
     if series:
         arrays["series_radii"] = np.array([radius for radius, _ in series])
-        arrays["series"] = np.concatenate([fields for _, fields in series])
+        arrays["series"] = np.concatenate([known.fields for _, known in series])
     motion = None
     if moving is not None:
         arrays["eigenvalues"], arrays["shapes"], (dt, alpha, delta, mass, stiffness), exact, coupling = moving

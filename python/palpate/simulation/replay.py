@@ -12,6 +12,7 @@ import numpy as np
 from palpate import _native
 from palpate.progress import progress_reporter
 from palpate.scene import BuiltScene, Scene
+from palpate.scene.series import with_whole_series
 from palpate.simulation.about import measured_by_surface, require_same, scene_of, with_recorded_series
 from palpate.simulation.connecting import assume_recorded
 from palpate.simulation.recording import Recording
@@ -90,7 +91,7 @@ def built_scene_of(recording: Recording, scene: Scene | BuiltScene | None = None
 
     """
     given = scene_of(dict(recording.about)) if scene is None else scene
-    built = given if isinstance(given, BuiltScene) else given.build()
+    built = with_whole_series(given if isinstance(given, BuiltScene) else given.build(), True)
     require_same(dict(recording.about), built)
     return with_recorded_series(dict(recording.about), built)
 

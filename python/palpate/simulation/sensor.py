@@ -111,7 +111,7 @@ class Sensor:
         sides = None
         if self._taxels is not None:
             sides = (*self._taxels, taxel_sides(self._scene, _sides(taxel_size)))
-        simulation._arm_strain_limit()
+        simulation._prepare_script()
         self._core = _native.SensorCore(simulation._core, self._count, bool(device_limits), sides)
         self._raw: dict[str, Any] | None = None
 

@@ -34,6 +34,7 @@ from palpate.simulation.frame import Contact, Frame, contact_of, frame_of
 from palpate.simulation.recording import LOG_DTYPE, Recording, RecordingStatus
 from palpate.simulation.scheduling import scheduled, start_loop
 from palpate.simulation.script import for_all_tools, grabs_of, orientations_of, positions_of, strike_of
+from palpate.simulation.series_growth import SeriesGrowth
 from palpate.simulation.thin import thin_places
 from palpate.vectors import three_numbers
 
@@ -55,7 +56,7 @@ def _stop_all() -> None:
         simulation.stop()
 
 
-class Simulation(Adjustable, SceneEditing):
+class Simulation(Adjustable, SeriesGrowth, SceneEditing):
     """Force loop of a scene.
 
     As a context manager it runs at 1 kHz on a thread of its own; :meth:`run` needs no clock.
@@ -170,6 +171,7 @@ class Simulation(Adjustable, SceneEditing):
             try:
                 start_loop(self._core, self.scene.device)
                 self._running = True
+                self._begin_series()
                 if self._to_record is not None:
                     path, self._to_record = self._to_record, None
                     self._begin_recording(path)
@@ -180,6 +182,7 @@ class Simulation(Adjustable, SceneEditing):
     def stop(self) -> None:
         """Stop the loop; devices are left at zero force, and closed."""
         RUNNING.discard(self)
+        self._end_series()
         self._core.stop()
         self._running = False
         disconnect(self._core, self._given, self._devices)
@@ -221,11 +224,12 @@ class Simulation(Adjustable, SceneEditing):
         """End the recording, if there is one, and return its status."""
         self._to_record = None
         status = self._core.end_recording()
+        _native.hold_series(self._core, False)
         return None if status is None else RecordingStatus(*status)
 
     def _begin_recording(self, path: Path) -> None:
         tools = len(self.scene.tools)
-        self._core.begin_recording(path, self._about((tools, tools == 1), clock=True))
+        self._core.begin_recording(path, self._about((tools, tools == 1), clock=True) | self._hold_series())
 
     def _about(self, shown: tuple[int, bool], clock: bool) -> dict[str, str]:
         return about(self.scene, self.bodies, _native.device_limits(self._core), shown, clock)
@@ -477,7 +481,7 @@ class Simulation(Adjustable, SceneEditing):
         struck = [(int(tick), body, *strike_of(*strike)) for tick, *strike in strikes]
         nodes = [(0, node) if np.ndim(node) == 0 else tuple(node) for node in watch]
         ranks = [(self._body(body), self._rank_of(node, body)) for body, node in nodes]
-        self._arm_strain_limit()
+        self._prepare_script()
         ticks, given, tools = *path.shape[:2], len(self.scene.tools)
         everything = for_all_tools(path, turned, held, tools)
         happens = (sorted(struck, key=lambda strike: strike[0]), ranks)

@@ -40,7 +40,7 @@ class Computing:
             if session.simulation.recording is None:  # a recording is of one scene: the store waits
                 green = background.take()
                 if green is not None:
-                    session.take_store(body, green)
+                    session.take_store(body, green, not background.is_complete)
         message = self.message(session)
         if self._last_message is not None and _is_same(message, self._last_message):
             return None
@@ -49,7 +49,8 @@ class Computing:
 
     def message(self, session: Session) -> dict[str, Any]:
         """Message with what can be touched by now."""
-        return {"type": "computed", "bodies": [self._entry(session, body) for body in range(len(session.built.bodies))]}
+        bodies = [self._entry(session, body) for body in range(len(session.built.bodies))]
+        return {"type": "computed", "bodies": bodies, "series": _series_entry(session)}
 
     def _entry(self, session: Session, body: int) -> dict[str, Any]:
         green, background = session.built.bodies[body].green, self._growing.get(body)
@@ -93,6 +94,20 @@ class Computing:
             background.close()
 
 
+def _series_entry(session: Session) -> dict[str, Any] | None:
+    """How far the series beyond small strain are; None where nothing is computed of them."""
+    background = session.simulation.series
+    if background is None or background.is_complete:
+        return None
+    left = background.seconds_left
+    return {
+        "done": background.done,
+        "places": background.places,
+        "left_s": None if left is None else round(left),
+        "stopped": background.error,
+    }
+
+
 def mask_text(mask: np.ndarray) -> str:
     """Bits of a mask in base64, the lowest of each byte first."""
     return base64.b64encode(np.packbits(mask, bitorder="little").tobytes()).decode()
@@ -119,6 +134,8 @@ def mask_of(message: Mapping[str, Any], key: str) -> np.ndarray:
 
 def _is_same(message: Mapping[str, Any], last: Mapping[str, Any]) -> bool:
     """Whether nothing differs but a little time."""
+    if message["series"] != last["series"]:
+        return False
     for now, before in zip(message["bodies"], last["bodies"], strict=True):
         left, last_left = now["left_s"], before["left_s"]
         if {**now, "left_s": None} != {**before, "left_s": None} or (left is None) != (last_left is None):

@@ -17,6 +17,7 @@ from palpate.errors import TouchWarning
 from palpate.mesh.triangles import area_vectors, node_area_vectors, units
 from palpate.scene import BuiltScene
 from palpate.scene.press_place import press_place
+from palpate.scene.series import with_whole_series
 from palpate.sessions.shapes import ARROW_PART, arrow, tool_surface
 from palpate.simulation import Frame, Simulation
 from palpate.vectors import rotated, turning_z_to
@@ -67,6 +68,7 @@ def gallery_picture(built: BuiltScene) -> bytes:
 
 def _pressed(built: BuiltScene) -> Frame:
     """Press within the limits of the scene until the force stands still."""
+    built = with_whole_series(built, True)
     place, depth = press_place(built)
     with warnings.catch_warnings(), Simulation(built) as simulation:
         warnings.simplefilter("ignore", TouchWarning)  # for the eye, not for a measurement

@@ -15,6 +15,7 @@ from palpate import _native
 from palpate._native import TOOL_SETTINGS
 from palpate.errors import ViewerError
 from palpate.scene import BuiltScene
+from palpate.scene.series import with_whole_series
 from palpate.scene.tables import SceneTables
 from palpate.simulation.about import recorded_tables
 from palpate.simulation.packed import SCENE_FILE, describe, describe_tool
@@ -44,7 +45,8 @@ def packed_page(built: BuiltScene, name: str) -> bytes:
     """
     if any(built.scene.device_of(tool).kind != "simulated" for tool in range(len(built.scene.tools))):
         raise ViewerError("a page without a server has no devices: give its tools the kind 'simulated'")
-    session = Session(built)
+    # The page and its recordings have the series as a whole.
+    session = Session(with_whole_series(built, True))
     files = {"page/scene.bin": _scene(session, name), "page/page.bin": _page(session, name), **_program_files(session)}
     header = json.dumps([{"name": name, "size": len(data)} for name, data in files.items()]).encode()
     parts = [struct.pack("<I", len(header)) + header, *files.values()]

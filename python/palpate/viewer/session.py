@@ -234,9 +234,9 @@ class Session:
             with contextlib.suppress(Error):
                 self._press(message)
 
-    def take_store(self, body: int, green: GreensFunction) -> None:
+    def take_store(self, body: int, green: GreensFunction, is_growing: bool) -> None:
         """Go on with a store of the same body in which more may be touched."""
-        self.simulation.take_store(body, green)
+        self.simulation.take_store(body, green, is_growing)
         self.built = replace(self.built, bodies=self.simulation.bodies)
 
     def scene_message(self) -> bytes:

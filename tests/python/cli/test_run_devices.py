@@ -5,12 +5,19 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
+import command_line
 import numpy as np
 import pytest
 from emulators import PRESS, inverse_service, library
 
+# Variable and file of each emulated library.
+LIBRARIES = {
+    "touch": ("PALPATE_OPENHAPTICS_LIBRARY", "hd"),
+    "forcedimension": ("PALPATE_FORCEDIMENSION_LIBRARY", "dhd"),
+}
 VARIABLES = ("PALPATE_HAPLY_ADDRESS", "PALPATE_OPENHAPTICS_LIBRARY", "PALPATE_FORCEDIMENSION_LIBRARY")
 # Above the top of the block, whose corner is the origin: first touch is in the middle of the device's workspace.
 TABLE = "[[device]]\nposition = [{}, 0.025, 0.056]\n"
@@ -41,27 +48,34 @@ def run(scene: Path, *devices: str, seconds: float = 2.0, **variables: str) -> s
     )
 
 
-def largest_forces(scene: Path) -> np.ndarray:
+@pytest.fixture(scope="module")
+def pressed(scene):
+    """What a run with a library in a pressing hand says, and its recording; each library runs once."""
+
+    @cache
+    def run_with(kind: str) -> tuple[str, Path]:
+        variable, emulated = LIBRARIES[kind]
+        done = run(scene, kind, **{variable: library(emulated), "PALPATE_EMULATED_HAND": PRESS})
+        assert done.returncode == 0, done.stderr
+        return done.stderr, (scene.parent / "run.mcap").rename(scene.parent / f"{kind}.mcap")
+
+    return run_with
+
+
+def largest_forces(recording: Path) -> np.ndarray:
     """Upward, on each device, N."""
     import palpate
 
-    recording = palpate.Recording.load(scene.parent / "run.mcap")
+    recording = palpate.Recording.load(recording)
     return recording.forces.reshape(len(recording.time), -1, 3)[:, :, 2].max(axis=0)
 
 
-@pytest.mark.parametrize(
-    ("kind", "variable", "emulated"),
-    [
-        ("touch", "PALPATE_OPENHAPTICS_LIBRARY", "hd"),
-        ("forcedimension", "PALPATE_FORCEDIMENSION_LIBRARY", "dhd"),
-    ],
-)
-def test_a_library_moves_the_first_tool(scene, kind, variable, emulated):
-    done = run(scene, kind, **{variable: library(emulated), "PALPATE_EMULATED_HAND": PRESS})
-    assert done.returncode == 0, done.stderr
-    forces = largest_forces(scene)
+@pytest.mark.parametrize("kind", LIBRARIES)
+def test_a_library_moves_the_first_tool(pressed, kind):
+    words, recording = pressed(kind)
+    forces = largest_forces(recording)
     assert 0.02 < forces[0] < 3.3 and forces[1] == 0.0
-    assert ("renders contacts up to 400 N/m, and this scene has up to 5000" in done.stderr) == (kind == "touch")
+    assert ("renders contacts up to 400 N/m, and this scene has up to 5000" in words) == (kind == "touch")
 
 
 @pytest.mark.slow
@@ -70,16 +84,14 @@ def test_two_devices_at_once(scene):
         hand = {"PALPATE_FORCEDIMENSION_LIBRARY": library("dhd"), "PALPATE_EMULATED_HAND": PRESS}
         done = run(scene, "forcedimension", "haply", seconds=4.0, PALPATE_HAPLY_ADDRESS=address, **hand)
     assert done.returncode == 0, done.stderr
-    assert (largest_forces(scene) > 0.02).all()
+    assert (largest_forces(scene.parent / "run.mcap") > 0.02).all()
 
 
-def test_the_first_recording_of_devices_is_made_again(scene):
-    done = run(scene, "touch", PALPATE_OPENHAPTICS_LIBRARY=library("hd"), PALPATE_EMULATED_HAND=PRESS)
-    assert done.returncode == 0, done.stderr
+def test_the_first_recording_of_devices_is_made_again(pressed):
     import palpate
 
     # What the device held was part of what was computed.
-    again = palpate.replay(scene.parent / "run.mcap")
+    again = palpate.replay(pressed("touch")[1])
     assert again.same and again.ticks > 500, again.differences[:1]
 
 
@@ -124,5 +136,6 @@ def test_options_that_cannot_be_are_refused(scene):
         (["haptic"], "--device: there is no device 'haptic'"),
         (["haply"] * 3, "--device was given 3 times, but the scene has 2 of [[tool]]"),
     ]:
-        done = run(scene, *devices)
+        options = [option for device in devices for option in ("--device", device)]
+        done = command_line.run("run", scene.name, "--headless", "2.0", *options, cwd=scene.parent)
         assert done.returncode == 2 and message in done.stderr, done.stderr

@@ -20,6 +20,7 @@ STEP, AIR = 20e-6, 200e-6
 # Work over the closed path over its peak; how deep tools are pressed, over their radii.
 TOLERANCE = 1e-3
 DEPTHS = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0)
+QUICK_DEPTHS = [pytest.param(part, marks=[] if part in (0.5, 2.0, 4.0) else [pytest.mark.slow]) for part in DEPTHS]
 CLEAR = 1e-3
 
 
@@ -122,7 +123,7 @@ def ratios(found: dict[str, float]) -> str:
 
 
 @pytest.mark.parametrize("tool", ["sphere", "small sphere"])
-@pytest.mark.parametrize("part", DEPTHS)
+@pytest.mark.parametrize("part", QUICK_DEPTHS)
 def test_a_torus_gives_out_no_more_than_was_put_in(loops, tool, part):
     """Deep presses end in a fading contact, which takes energy away: what is given back is not tested."""
     found = shares(loops, "torus", tool, torus_paths(RADII[tool], part * RADII[tool]))
@@ -130,7 +131,7 @@ def test_a_torus_gives_out_no_more_than_was_put_in(loops, tool, part):
 
 
 @pytest.mark.parametrize("tool", ["sphere", "small sphere"])
-@pytest.mark.parametrize("part", DEPTHS)
+@pytest.mark.parametrize("part", QUICK_DEPTHS)
 def test_a_cups_wall_gives_back_what_was_put_in(loops, tool, part):
     found = shares(loops, "cup", tool, cup_paths(RADII[tool], part * RADII[tool]))
     assert all(abs(given) <= TOLERANCE for given in found.values()), ratios(found)

@@ -71,7 +71,7 @@ def test_without_the_series_a_beam_is_too_stiff():
         assert (forces_on(scene) / FORCES)[-1] > 1.0 + 4.0 * ALLOWED
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.4])
+@pytest.mark.parametrize("friction", [0.0, pytest.param(0.4, marks=pytest.mark.slow)])
 def test_a_closed_path_on_a_beam_gives_out_nothing(friction):
     corners = ((0.08, 0.01, 0.0305), (0.08, 0.01, 0.015), (0.06, 0.012, 0.018), (0.06, 0.012, 0.0305))
     path = polyline(*corners, count=400)

@@ -45,7 +45,7 @@ def test_sweeps_in_a_groove_have_no_jump_and_never_pull(grooved):
         assert (forces[:, 2] >= np.abs(forces[:, 0]) * 0.97).all(), name
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.3])
+@pytest.mark.parametrize("friction", [0.0, pytest.param(0.3, marks=pytest.mark.slow)])
 def test_closed_paths_in_a_groove_give_out_nothing_and_repeat_to_the_bit(grooved, friction):
     leaks = [groove.given_out(loop_of(*grooved, [sphere(groove.RADIUS, friction)]), 12) for _ in range(2)]
     assert leaks[0] == leaks[1] and leaks[0] <= 1e-3

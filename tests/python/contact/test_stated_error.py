@@ -13,7 +13,14 @@ ALLOWED = 0.025
 BODIES = {cylinder.name: cylinder for cylinder in references()}
 
 
-@pytest.mark.parametrize("name", ["block 0.025 0.3", "block 0.025 0.45", "block 0.025 0.49", "random 2"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        *(pytest.param(f"block 0.025 {nu}", marks=pytest.mark.slow) for nu in (0.3, 0.49)),
+        "block 0.025 0.45",
+        "random 2",
+    ],
+)
 def test_forces_are_those_of_a_full_solution_within_the_stated_error(name, tmp_path):
     body = BODIES[name]
     forces, stated = body.pressed(tmp_path)

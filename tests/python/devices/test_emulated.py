@@ -13,21 +13,24 @@ from emulators import REST, inverse_service, library
 # The libraries read what is plugged in when they are loaded: a process of its own.
 PROGRAM = """
 import json
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
 from palpate.devices import SelfCheck, listings
 
-checks = {}
-for listing in listings():
+def checked(listing):
     (device,) = listing.found
     with SelfCheck(listing.kind, device.id) as check:
         rest, pushes = check.watch(0.4), [check.push(direction, 0.5, 0.5) for direction in ("+x", "-y", "+z")]
-        checks[listing.kind] = {
-            "name": device.name, "obstacle": device.obstacle, "force": device.limits.max_force, "rest": asdict(rest),
-            "passed": rest.passed, "verdicts": [push.verdict for push in pushes],
-            "moved": [push.moved for push in pushes], "faults": [push.fault for push in pushes],
-            "pushed": [push.force for push in pushes],
-        }
-print(json.dumps(checks))
+    return listing.kind, {
+        "name": device.name, "obstacle": device.obstacle, "force": device.limits.max_force, "rest": asdict(rest),
+        "passed": rest.passed, "verdicts": [push.verdict for push in pushes],
+        "moved": [push.moved for push in pushes], "faults": [push.fault for push in pushes],
+        "pushed": [push.force for push in pushes],
+    }
+
+# The checks wait for hands to move, all at the same time.
+with ThreadPoolExecutor() as pool:
+    print(json.dumps(dict(pool.map(checked, listings()))))
 """
 
 

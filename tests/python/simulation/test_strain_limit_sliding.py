@@ -37,7 +37,7 @@ def drag(body: palpate.Body) -> tuple[np.ndarray, slice]:
     return path, slice(begin, begin + 2 * len(there))
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.3, 1.0])
+@pytest.mark.parametrize("friction", [0.3, *(pytest.param(other, marks=pytest.mark.slow) for other in (0.0, 1.0))])
 def test_a_drag_beyond_the_limit_is_held_evenly_and_gives_out_nothing(block, friction):
     body, green = block
     scene = palpate.Scene(

@@ -61,6 +61,14 @@ def test_the_page_is_told_what_is_ready_and_what_it_paints_comes_next(scene):
                 message, _ = await client.receive("computed")
                 entry = message["bodies"][0]
             assert entry["done"] == entry["columns"] and entry["waiting"] is None
+            # Then the series of the complete body is computed, and none before.
+            while message["series"] is None:
+                message, _ = await client.receive("computed")
+            while message["series"] is not None:
+                assert message["series"]["stopped"] is None
+                message, _ = await client.receive("computed")
+            ((_, known),) = scene.build(progress=False).bodies[0].series
+            assert known is not None and known.is_complete
             # The loop has taken the store: the corner far from what came first can be pressed.
             await client.say(type="press", tool=0, position=[0.01, 0.01, SIDE + 0.02], grab=False)
             await client.frame_where(lambda header: header["tools"][0]["active"])
@@ -87,3 +95,25 @@ def test_a_mask_that_is_none_is_refused_while_columns_are_computed(scene, monkey
                 assert refused["text"].startswith("paint: ")
 
     asyncio.run(run())
+
+
+def test_the_page_says_how_far_the_series_are_and_the_loop_has_them_then(monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    mesh = box_mesh((6, 6, 6), (SIDE, SIDE, SIDE), jitter=0.0)
+    mesh.write(tmp_path / "cube.vtu")
+    table = {"mesh": str(tmp_path / "cube.vtu"), "unit": "m"}
+    scene = palpate.Scene(body=table, supports={"fixed": "z < 1mm"}, tool=[{"radius": "6mm"}])
+    built = scene.build(progress=False)
+    assert [known for _, known in built.bodies[0].series] == [None]
+
+    async def run():
+        async with serving(built) as server, page(server) as client:
+            seen = []
+            while not seen or seen[-1] is not None:
+                message, _ = await client.receive("computed")
+                seen.append(message["series"])
+            assert seen[0] is not None and all(entry["stopped"] is None for entry in seen[:-1])
+            assert all(entry["done"] <= entry["places"] for entry in seen[:-1])
+
+    asyncio.run(run())
+    assert [known.is_complete for _, known in scene.build(progress=False).bodies[0].series] == [True]

@@ -41,6 +41,7 @@ class StandingComputing(Computing):
         return {
             "type": "computed",
             "bodies": [{**entry, "done": 300, "columns": 600, "left_s": 130.0, "stopped": None}],
+            "series": None,
         }
 
     def paint(self, session: Any, message: Any) -> None:

@@ -1,9 +1,21 @@
-// Messages about columns that are still computed, and about regions painted to be computed next.
+// Messages about columns and series that are still computed, and about regions painted to be computed next.
 
 /** How far the columns of every body are, in their order: sent when a page opens, and when it changes. */
 export interface ComputedMessage {
   type: "computed";
   bodies: ComputedBody[];
+  /** How far the series beyond small strain are; null while nothing is computed of them. */
+  series: ComputedSeries | null;
+}
+
+export interface ComputedSeries {
+  /** Places done, and in all; none while the places are chosen. */
+  done: number;
+  places: number;
+  /** Until all are done; null while that is not known. */
+  left_s: number | null;
+  /** Why nothing is computed any more though places are missing; else null. */
+  stopped: string | null;
 }
 
 export interface ComputedBody {

@@ -37,12 +37,10 @@
 //! an exception: under a patch of one and a half thicknesses a plate bends 10 to 15 % less than under a small contact, and a glued
 //! layer is squeezed less. There the extrapolation counts in part, and fully where the body is as thin as `b`.
 
-use std::sync::Arc;
-
 use glam::DMat3;
 
-use super::local::{SeriesFields, StrainTerms};
-use super::smooth::{Fan, SmoothSurface};
+use super::local::StrainTerms;
+use super::smooth::{Blended, Fan, FanWeights, SmoothSurface};
 use super::{
     PatchGeometry, PatchScratch, Refusal, SurfacePoint, TouchPatch, patch_weights, raise_eigenvalues,
     smallest_eigenvalue,
@@ -150,12 +148,22 @@ pub const WIDENING: usize = 11;
 /// Fields of the coefficients of finite strain.
 pub const STRAIN_TERMS: std::ops::Range<usize> = 12..15;
 
+/// Fields blended by the weights of fans. The coefficients of finite strain are read for a hyperelastic body only: all of them are
+/// zero on a linear one. The others fill the processor's vector registers.
+pub fn blend_fields(weights: &FanWeights, fields: &[FanFields], is_hyperelastic: bool) -> Blended<FIELDS> {
+    const LINEAR: usize = STRAIN_TERMS.start;
+    let mut blended = Blended::default();
+    weights.blend_part::<FIELDS, LINEAR>(fields, 0, &mut blended);
+    if is_hyperelastic {
+        weights.blend_part::<FIELDS, { FIELDS - LINEAR }>(fields, LINEAR, &mut blended);
+    }
+    blended
+}
+
 /// Regular compliance of a body for tools of one radius.
 pub struct RegularCompliance {
     /// One entry for each fan of the smooth surface.
     pub fields: Vec<FanFields>,
-    /// Higher orders of the displacement at each fan, where they are known.
-    pub series: Option<Arc<[SeriesFields]>>,
 }
 
 /// Data of a body for its regular compliance.
@@ -208,7 +216,7 @@ impl RegularCompliance {
             fields[STRAIN_TERMS].copy_from_slice(&body.moduli.strain_terms[fan.node as usize]);
             fields
         });
-        Self { fields: fields.collect(), series: None }
+        Self { fields: fields.collect() }
     }
 }
 

@@ -93,7 +93,7 @@ fn load(path: &Path, key: &str, fans: usize) -> Option<RegularCompliance> {
     let mut file = KIND.read(path).ok()?;
     let (shape, numbers) = file.take("fields").ok()?;
     let right = shape == [fans, FIELDS] && file.text("key") == key;
-    right.then(|| RegularCompliance { fields: numbers.as_chunks().0.to_vec(), series: None })
+    right.then(|| RegularCompliance { fields: numbers.as_chunks().0.to_vec() })
 }
 
 #[cfg(test)]

@@ -37,8 +37,31 @@ pub struct Tessellation {
     creases: Vec<[bool; 3]>,
     /// A ball around each triangle's vertices.
     balls: Vec<(DVec3, f64)>,
+    /// The pieces of all triangles.
+    pieces: Vec<Piece>,
     /// The largest of all [`Self::bulges`], m.
     largest_bulge: f64,
+}
+
+/// A piece, as a flat triangle.
+#[derive(Clone, Copy, Debug)]
+pub struct Piece {
+    /// The middle of its corners, m.
+    pub middle: DVec3,
+    /// Unit outward normal.
+    pub normal: DVec3,
+    /// Its area, m^2.
+    pub area: f64,
+    /// Farthest corner from the middle, m.
+    pub size: f64,
+}
+
+impl Piece {
+    fn new([a, b, c]: [DVec3; 3]) -> Self {
+        let (middle, across) = ((a + b + c) / 3.0, (b - a).cross(c - a));
+        let size = [a, b, c].iter().map(|corner| corner.distance_squared(middle)).fold(0.0, f64::max).sqrt();
+        Self { middle, normal: across.normalize_or_zero(), area: 0.5 * across.length(), size }
+    }
 }
 
 impl Tessellation {
@@ -76,11 +99,13 @@ impl Tessellation {
             barycentric: lattice.middles(),
             across: lattice.across(surface),
             creases: lattice.creases(surface.triangles.len(), smooth),
+            pieces: Vec::new(),
             largest_bulge: 0.0,
         };
         let count = (surface.triangles.len() * pieces.pieces_of_triangle()) as u32;
         let largest_bulge = (0..count).flat_map(|piece| pieces.bulges(piece)).fold(0.0, f64::max);
-        Self { largest_bulge, ..pieces }
+        let flat = (0..count).map(|piece| Piece::new(pieces.corners(piece))).collect();
+        Self { largest_bulge, pieces: flat, ..pieces }
     }
 
     /// The highest points of a piece, m, that may be higher than its corners: for each edge the place and how far the surface lies
@@ -158,12 +183,12 @@ impl Tessellation {
         ranges.add(&self.across);
         ranges.add(&self.creases);
         ranges.add(&self.balls);
+        ranges.add(&self.pieces);
     }
 
-    /// Unit outward normal of a piece.
-    pub fn normal(&self, piece: u32) -> DVec3 {
-        let [a, b, c] = self.corners(piece);
-        (b - a).cross(c - a).normalize_or_zero()
+    /// A piece as a flat triangle.
+    pub fn piece(&self, piece: u32) -> &Piece {
+        &self.pieces[piece as usize]
     }
 }
 

@@ -40,6 +40,8 @@ pub use no_interior::Interior;
 pub use node_order::TouchNode;
 pub use precision::Precision;
 #[cfg(feature = "offline")]
+pub(crate) use precompute::spatial_order;
+#[cfg(feature = "offline")]
 pub use precompute::{
     AssembledProblem, Claim, ColumnStore, Columns, Growth, Measurement, Phase, PhaseCallback, Plan, PreviousWork,
     Problem, Progress, RequestedPrecision, Target, TaskMemory, checksum, plan, precompute, precompute_to, products,

@@ -14,9 +14,11 @@
 //! of what the series leaves out.
 
 mod body;
+mod coefficients;
 mod half_space;
 mod half_space_table;
 mod internal;
+mod known;
 mod places;
 mod store;
 mod stress;
@@ -24,5 +26,6 @@ mod truncated;
 
 pub use body::{HyperelasticBody, PatchLoad, SeriesAt};
 pub use half_space::half_space_terms;
-pub use places::{Series, SeriesPlan, compute_series};
+pub use known::{Layout, Series, Side};
+pub use places::SeriesPlan;
 pub use store::SeriesFile;

@@ -1,15 +1,20 @@
 //! Files of series beside the body's store: safetensors, found by content key, replaced only by rename.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
-use super::places::{Series, SeriesPlan, compute_series};
-use crate::Result;
-use crate::arrays_file::ArraysKind;
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::known::{Layout, Series, Side};
+use super::places::SeriesPlan;
+use crate::arrays_file::{ArraysFile, ArraysKind};
 use crate::contact::local::{SERIES_FIELDS, StrainLaw};
 use crate::green::{Problem, Progress};
+use crate::{Error, Result};
 
 /// Version of the computation and of the file's layout; part of the key.
-const VERSION: u32 = 6;
+const VERSION: u32 = 7;
 const KIND: ArraysKind = ArraysKind { format: "palpate-series", name: "file of series", version: VERSION };
 /// Digits of the key in the name of a file.
 const DIGITS: usize = 16;
@@ -41,35 +46,100 @@ impl SeriesFile {
         Self { path, key }
     }
 
-    /// The stored series; `None` for a file that is missing, damaged or of another body.
-    pub fn load(&self) -> Option<Series> {
-        let mut file = KIND.read(&self.path).ok()?;
-        let (fields, positions) = (file.take("fields").ok()?, file.take("positions").ok()?);
-        let right = fields.0[1..] == [SERIES_FIELDS] && positions.0 == [fields.0[0], 3];
-        let stored =
-            || Series { fields: fields.1.as_chunks().0.to_vec(), positions: positions.1.as_chunks().0.to_vec() };
-        (right && file.text("key") == self.key).then(stored)
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
     }
 
-    /// Computes the series, and stores it if the file can be written.
+    /// Reads any file of series, of whatever body.
     ///
     /// # Errors
-    /// See [`compute_series`].
+    /// [`Error::Store`] that says what is wrong, or the operating system's error.
+    pub fn read(path: &Path) -> Result<Series> {
+        let mut file = KIND.read(path)?;
+        let broken = || Error::Store { path: path.to_owned(), reason: "is damaged: its arrays do not fit".into() };
+        series_of(&mut file).ok_or_else(broken)
+    }
+
+    /// The stored series, complete or not; `None` for a file that is missing, damaged or of another body.
+    pub fn load(&self) -> Option<Series> {
+        let mut file = KIND.read(&self.path).ok()?;
+        if file.text("key") != self.key { None } else { series_of(&mut file) }
+    }
+
+    /// Computes what is not stored yet, those blocks first that are `near` a point, m, and stores every round of them if the file can
+    /// be written. The result has the same bits for any order, and after any interruption.
+    ///
+    /// # Errors
+    /// A body that is not held, or an interruption by `progress`, which is called with the known places and all of them.
     pub fn compute(
         &self,
-        problem: &Problem,
-        laws: &[StrainLaw],
+        (problem, laws): (&Problem, &[StrainLaw]),
         radius: f64,
+        near: &(dyn Fn() -> Option<DVec3> + Sync),
         progress: Progress<'_>,
     ) -> Result<Series> {
-        let computed = compute_series(&SeriesPlan::new(problem, laws, radius)?, progress)?;
-        let fans = computed.fields.len();
-        let arrays = [
-            ("fields", vec![fans, SERIES_FIELDS], computed.fields.as_flattened()),
-            ("positions", vec![fans, 3], computed.positions.as_flattened()),
-        ];
-        // The result is the same if it cannot be written.
-        drop(KIND.write(&self.path, &[("key", &self.key)], &arrays));
-        Ok(computed)
+        let plan = SeriesPlan::new(problem, laws, radius)?;
+        let (layout, stored) = (plan.layout(), self.load());
+        let fitting = stored.filter(|stored| stored.layout == layout);
+        let mut series = fitting.unwrap_or_else(|| Series::empty(layout));
+        if series.is_complete() {
+            return Ok(series);
+        }
+        let (done, all) = (AtomicUsize::new(series.done()), series.layout.places.len());
+        let interrupted = |done: usize| if progress(done, all) { Ok(()) } else { Err(Error::Interrupted) };
+        interrupted(series.done())?;
+        let body = plan.factorize()?;
+        while !series.is_complete() {
+            let solve = |block: usize| {
+                let fields = plan.solve(&body, block);
+                let before = done.fetch_add(fields.len(), Ordering::Relaxed);
+                interrupted(before + fields.len()).map(|()| (block, fields))
+            };
+            let round = series.next(rayon::current_num_threads(), near());
+            let found: Result<Vec<_>> = round.into_par_iter().map(solve).collect();
+            found?.iter().for_each(|(block, fields)| series.set(*block, fields));
+            // The result is the same if it cannot be written.
+            drop(self.write(&series));
+        }
+        Ok(series)
     }
+
+    fn write(&self, series: &Series) -> Result<()> {
+        let Series { layout, fields, known } = series;
+        let sides: Vec<f64> =
+            layout.sides.iter().flat_map(|side| [side.position.to_array(), side.normal.to_array()].concat()).collect();
+        let places: Vec<f64> = layout.places.iter().map(|&fan| f64::from(fan)).collect();
+        let known: Vec<f64> = known.iter().map(|&known| f64::from(u8::from(known))).collect();
+        let arrays = [
+            ("fields", vec![fields.len(), SERIES_FIELDS], fields.as_flattened()),
+            ("known", vec![known.len()], &known[..]),
+            ("places", vec![places.len()], &places[..]),
+            ("sides", vec![layout.sides.len(), 6], &sides[..]),
+            ("spacing", vec![1], &[layout.spacing]),
+        ];
+        KIND.write(&self.path, &[("key", &self.key)], &arrays)
+    }
+}
+
+/// The series in a verified file; `None` for arrays that do not go together.
+fn series_of(file: &mut ArraysFile) -> Option<Series> {
+    let [fields, known, places, sides, spacing] =
+        ["fields", "known", "places", "sides", "spacing"].map(|name| file.take(name).ok().map(|(_, numbers)| numbers));
+    let (sides, places): (Vec<f64>, Vec<f64>) = (sides?, places?);
+    let side =
+        |[x, y, z, nx, ny, nz]: &[f64; 6]| Side { position: DVec3::new(*x, *y, *z), normal: DVec3::new(*nx, *ny, *nz) };
+    let layout = Layout {
+        sides: sides.as_chunks().0.iter().map(side).collect(),
+        places: places.iter().map(|&fan| fan as u32).collect(),
+        spacing: *spacing?.first()?,
+    };
+    let series = Series {
+        fields: fields?.as_chunks().0.to_vec(),
+        known: known?.iter().map(|&known| known > 0.0).collect(),
+        layout,
+    };
+    let Series { layout, fields, known } = &series;
+    let inside = layout.places.iter().all(|&fan| (fan as usize) < layout.sides.len());
+    (inside && fields.len() == layout.places.len() && known.len() == layout.blocks()).then_some(series)
 }

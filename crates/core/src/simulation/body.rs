@@ -4,8 +4,10 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use super::MAX_TOOLS;
 use super::contacts::Contact;
 use super::input::Placement;
+use super::known_series::KnownSeries;
 use crate::contact::shape::ToolShape;
 use crate::contact::smooth::{DrawnSurface, Fan, FootPoint, Neighbourhood, SmoothSurface};
 use crate::contact::{
@@ -72,6 +74,8 @@ pub struct LocalSurface {
 pub struct BodyModel {
     /// Position and rotation in the world.
     pub placement: Placement,
+    /// Higher orders of the displacement that a simulation starts with.
+    pub(super) series: Vec<Arc<KnownSeries>>,
     prepared: Arc<PreparedBody>,
 }
 
@@ -91,8 +95,6 @@ pub struct PreparedBody {
     pub(super) mean_edge: f64,
     /// Data of the local law; without them only the laws `patch` and `node` can be used.
     pub(super) local: Option<LocalSurface>,
-    /// Higher orders of the displacement at the fans of the smooth surface, by the radius of the tool, m.
-    pub(super) series: Vec<(f64, Arc<[SeriesFields]>)>,
 }
 
 impl BodyModel {
@@ -108,18 +110,8 @@ impl BodyModel {
         let query = SurfaceQuery::new(&loaded)?;
         let geometry = PatchGeometry::new(&green.surface);
         let mean_edge = mean_edge(&green.surface);
-        let prepared = PreparedBody {
-            green,
-            free,
-            query,
-            loaded,
-            geometry,
-            dynamics: None,
-            mean_edge,
-            local: None,
-            series: vec![],
-        };
-        Ok(Self { placement, prepared: Arc::new(prepared) })
+        let prepared = PreparedBody { green, free, query, loaded, geometry, dynamics: None, mean_edge, local: None };
+        Ok(Self { placement, series: Vec::new(), prepared: Arc::new(prepared) })
     }
 
     /// The same body, ready for the local law.
@@ -151,16 +143,26 @@ impl BodyModel {
         self.preparing(|prepared| prepared.local = Some(local))
     }
 
-    /// The same body with higher orders of its displacement for spheres of `radius`, m, at the fans of its smooth surface.
+    /// The same body with higher orders of its displacement for one more radius, or others for a radius that it has. A simulation may
+    /// take up more of them while it runs: see [`State::take_series`](super::State::take_series). Without fields nothing is known yet.
     ///
     /// # Errors
-    /// A body without elastic constants, or coefficients of another surface.
-    pub fn with_series(self, radius: f64, series: Arc<[SeriesFields]>) -> Result<Self> {
-        let fans = self.local.as_ref().map_or(0, |local| local.smooth.fans().len());
-        if series.len() != fans {
-            return Err(Error::Invalid(format!("a series at {} places, the surface has {fans}", series.len())));
+    /// A body without elastic constants, coefficients of another surface, or more radii than tools.
+    pub fn with_series(mut self, mut series: Arc<KnownSeries>) -> Result<Self> {
+        let fans = self.fan_count();
+        if series.fields.is_empty() {
+            Arc::make_mut(&mut series).fields = vec![SeriesFields::default(); fans];
         }
-        self.preparing(|prepared| prepared.series.push((radius, series)))
+        let given = series.fields.len();
+        if given != fans {
+            return Err(Error::Invalid(format!("a series at {given} places, the surface has {fans}")));
+        }
+        self.series.retain(|known| known.radius != series.radius);
+        if self.series.len() == MAX_TOOLS {
+            return Err(Error::Invalid(format!("a body has series for at most {MAX_TOOLS} radii")));
+        }
+        self.series.push(series);
+        Ok(self)
     }
 
     /// The same body in motion.
@@ -195,6 +197,17 @@ impl BodyModel {
     /// The same body at another placement.
     pub fn placed(&self, placement: Placement) -> Self {
         Self { placement, ..self.clone() }
+    }
+
+    /// Adds the memory that a tick reads.
+    pub(super) fn add_memory(&self, ranges: &mut Ranges) {
+        self.prepared.add_memory(ranges);
+        self.series.iter().for_each(|series| ranges.add(&series.fields));
+    }
+
+    /// Series that a simulation starts with.
+    pub fn series(&self) -> &[Arc<KnownSeries>] {
+        &self.series
     }
 
     /// Whether both are the same body, whatever their placements.
@@ -237,6 +250,11 @@ impl PreparedBody {
     /// Whether a material at the surface has a law beyond small strain.
     pub fn is_hyperelastic(&self) -> bool {
         self.local.as_ref().is_some_and(|local| local.is_hyperelastic)
+    }
+
+    /// Number of fans of its smooth surface; zero without elastic constants.
+    pub fn fan_count(&self) -> usize {
+        self.local.as_ref().map_or(0, |local| local.smooth.fans().len())
     }
 
     /// Whether the body moves.

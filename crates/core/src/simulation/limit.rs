@@ -12,7 +12,6 @@
 use glam::DVec3;
 
 use super::MAX_CONTACTS;
-use super::contacts::Mode;
 use super::law::law_of;
 use super::model::Model;
 use super::scratch::Scratch;
@@ -64,9 +63,9 @@ fn provisional_bound(model: &Model, state: &State, slot: usize, limit: f64) -> f
 /// that of ramp and slew limit is: the forces before the reduction follow from one energy.
 pub(super) fn limit_sliding_forces(model: &Model, state: &mut State, body: usize, limit: f64) {
     let share = share_within(state, body, limit);
-    for slot in 0..MAX_CONTACTS {
+    for slot in state.contacts.occupied() {
         let contact = &state.contacts.slots[slot];
-        if contact.mode == Mode::Free || contact.body != body || !contact.nonlinear {
+        if contact.body != body || !contact.nonlinear {
             continue;
         }
         let covered = StrainWatch::covers(state.bodies[body].strain.as_deref(), contact);

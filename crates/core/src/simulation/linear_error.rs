@@ -8,7 +8,6 @@
 //!
 //! of which a linear contact has the first term. The ratios are largest at a Poisson's ratio near 0.45.
 
-use super::contacts::Mode;
 use super::input::Controls;
 use super::model::Model;
 use super::state::State;
@@ -27,9 +26,9 @@ pub fn estimate_linear_errors(model: &Model, state: &mut State, body: usize, con
     let Some(local) = fixed.local.as_ref().filter(|local| local.is_hyperelastic) else { return };
     let scale = state.bodies[body].stiffness_scale;
     let smallest = (local.bounds[1] - local.bounds[0]).min_element();
-    for slot in 0..state.contacts.slots.len() {
+    for slot in state.contacts.occupied() {
         let contact = &state.contacts.slots[slot];
-        if contact.mode == Mode::Free || contact.body != body || contact.nonlinear {
+        if contact.body != body || contact.nonlinear {
             continue;
         }
         let Some(&node) = state.contacts.patches[slot].patch().nodes().first() else { continue };

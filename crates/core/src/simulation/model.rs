@@ -2,7 +2,10 @@
 
 use std::sync::Arc;
 
+use glam::DQuat;
+
 use super::body::BodyModel;
+use super::known_series::KnownSeries;
 use super::tool::ToolModel;
 use super::{MAX_BODIES, MAX_TOOLS};
 use crate::contact::footprint::PressedSurface;
@@ -11,12 +14,15 @@ use crate::contact::{CompliantBody, Concavities, RegularCompliance};
 use crate::memory::Ranges;
 use crate::{Error, Result};
 
-/// Bodies and tools.
+/// Bodies and tools. Copies share the prepared data.
+#[derive(Clone)]
 pub struct Model {
     /// The bodies.
     pub bodies: Vec<BodyModel>,
     /// The tools, one for each device.
     pub tools: Vec<ToolModel>,
+    /// By body: the rotation from the world into its frame.
+    pub(super) frames: Vec<DQuat>,
     /// By tool and body, for tools under the local law: the compliance of the body beyond the half-space.
     pub(super) regular_compliances: Vec<Vec<Option<Arc<RegularCompliance>>>>,
     /// By tool and body, for such tools that are not spheres: the surface divided into pieces.
@@ -30,10 +36,10 @@ impl Model {
     /// times a second.
     pub fn memory(&self) -> Ranges {
         let mut ranges = Ranges::default();
+        ranges.add(&self.frames);
         self.bodies.iter().for_each(|body| body.add_memory(&mut ranges));
         for compliance in self.regular_compliances.iter().flatten().flatten() {
             ranges.add(&compliance.fields);
-            compliance.series.iter().for_each(|series| ranges.add(series));
         }
         self.pressed_surfaces.iter().flatten().flatten().for_each(|surface| surface.add_memory(&mut ranges));
         self.concavities.iter().flatten().for_each(|concavities| concavities.add_memory(&mut ranges));
@@ -94,7 +100,20 @@ impl Model {
             regular_compliances[rank].iter().map(Option::as_deref).zip(&bodies).map(of_body).collect()
         };
         let pressed_surfaces = tools.iter().enumerate().map(pressed_of_tool).collect();
-        Ok(Self { bodies, tools, regular_compliances, pressed_surfaces, concavities })
+        let frames = bodies.iter().map(|body| DQuat::from_mat3(&body.placement.rotation.transpose())).collect();
+        Ok(Self { bodies, tools, frames, regular_compliances, pressed_surfaces, concavities })
+    }
+
+    /// The same model where a body starts with other higher orders of its displacement: see [`BodyModel::with_series`].
+    ///
+    /// # Errors
+    /// A body that there is not, and as of [`BodyModel::with_series`].
+    pub fn with_series(&self, body: usize, series: Arc<KnownSeries>) -> Result<Self> {
+        let mut model = self.clone();
+        let missing = || Error::Invalid(format!("there is no body {body}"));
+        let with_series = model.bodies.get(body).ok_or_else(missing)?.clone().with_series(series)?;
+        model.bodies[body] = with_series;
+        Ok(model)
     }
 
     /// The regular compliance of such a tool and body, if this model has it.
@@ -142,11 +161,5 @@ fn regular_compliance(body: &BodyModel, tool: &ToolModel) -> Result<Option<Arc<R
     let (smooth, moduli, moves) = (&local.smooth, &local.moduli, body.moves());
     let inverse_sizes = &local.inverse_sizes;
     let compliant = CompliantBody { green, geometry, smooth, moduli, inverse_sizes, moves };
-    let mut regular = RegularCompliance::load_or_compute(compliant, tool.radius, tool.max_stiffness);
-    // A body in motion is displaced by its modes, which are linear.
-    if !moves && !tool.shape.needs_cells() {
-        let of_radius = body.series.iter().find(|(radius, _)| *radius == tool.radius);
-        regular.series = of_radius.map(|(_, series)| series.clone());
-    }
-    Ok(Some(Arc::new(regular)))
+    Ok(Some(Arc::new(RegularCompliance::load_or_compute(compliant, tool.radius, tool.max_stiffness))))
 }

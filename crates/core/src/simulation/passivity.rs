@@ -34,7 +34,7 @@ const LONGEST_MOTION: f64 = 0.1;
 pub struct ObservedContact {
     /// Its slot, and its number among all since the start.
     pub slot: usize,
-    pub number: Option<u64>,
+    pub number: u64,
     /// Position of its tool less the displacement of the body by other laws, m, and orientation of the tool.
     pub position: DVec3,
     pub orientation: DQuat,
@@ -54,13 +54,44 @@ pub struct ObservedContact {
 /// Energy observer of a body.
 #[derive(Clone, Debug, Default)]
 pub struct PassivityObserver {
-    previous: [ObservedContact; MAX_CONTACTS],
+    previous: ObservedContacts,
     energy: ContactEnergy,
     /// Observed in this tick.
-    contacts: [ObservedContact; MAX_CONTACTS],
+    contacts: ObservedContacts,
     observed_energy: ContactEnergy,
     /// Young's modulus over the Green's function's.
     scale: f64,
+}
+
+/// The contacts of a tick in their slots. Two or three of many slots are usual: what others hold is neither cleared nor copied.
+#[derive(Clone, Debug, Default)]
+struct ObservedContacts {
+    slots: [ObservedContact; MAX_CONTACTS],
+    /// A bit for each slot that has been set.
+    occupied: u32,
+}
+
+impl ObservedContacts {
+    fn set(&mut self, contact: ObservedContact) {
+        self.slots[contact.slot] = contact;
+        self.occupied |= 1 << contact.slot;
+    }
+
+    /// The contact in the slot of another one, if both are the same.
+    fn same_as(&self, contact: &ObservedContact) -> Option<&ObservedContact> {
+        let known = &self.slots[contact.slot];
+        (self.occupied & 1 << contact.slot != 0 && known.number == contact.number).then_some(known)
+    }
+
+    fn copy_from(&mut self, other: &Self) {
+        self.occupied = other.occupied;
+        let mut left = other.occupied;
+        while left != 0 {
+            let slot = left.trailing_zeros() as usize;
+            self.slots[slot] = other.slots[slot];
+            left &= left - 1;
+        }
+    }
 }
 
 /// Energies of the contacts of a body, J.
@@ -94,14 +125,13 @@ impl PassivityObserver {
     /// Energy of the contacts under the forces of this tick. The stored energy of a new contact counts as work.
     pub fn observe(&mut self, contacts: impl Iterator<Item = ObservedContact>, scale: f64) -> ContactEnergy {
         let (mut stored, mut work, mut is_known) = (0.0, 0.0, true);
-        self.contacts = Default::default();
+        self.contacts.occupied = 0;
         for now in contacts {
-            self.contacts[now.slot] = now;
+            self.contacts.set(now);
             let relative_motion = now.largest_motion / (LONGEST_MOTION * now.radius);
             is_known &= relative_motion < 1.0;
-            let before = &self.previous[now.slot];
             stored += now.stored;
-            work += if now.number == before.number {
+            work += if let Some(before) = self.previous.same_as(&now) {
                 let rotation = rotation_vector(before.orientation, now.orientation);
                 0.5 * (before.force + now.force).dot(now.position - before.position)
                     - 0.5 * (before.torque + now.torque).dot(rotation)
@@ -121,7 +151,8 @@ impl PassivityObserver {
 
     /// Makes the latest observation the previous one of the next tick.
     pub fn commit(&mut self, scale: f64) {
-        (self.previous, self.energy, self.scale) = (self.contacts, self.observed_energy, scale);
+        self.previous.copy_from(&self.contacts);
+        (self.energy, self.scale) = (self.observed_energy, scale);
     }
 }
 
@@ -133,7 +164,7 @@ mod tests {
     fn spring(depth: f64, times: f64) -> ObservedContact {
         let (force, stored) = (DVec3::NEG_Z * 100.0 * depth, times * 50.0 * depth * depth);
         ObservedContact {
-            number: Some(1),
+            number: 1,
             position: DVec3::NEG_Z * depth,
             largest_motion: 1e-5,
             radius: 1.0,

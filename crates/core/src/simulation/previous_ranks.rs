@@ -1,6 +1,9 @@
 //! Take-over of contacts and motions when the bodies or tools of a running simulation change.
 
+use std::sync::Arc;
+
 use super::contacts::Mode;
+use super::known_series::KnownSeries;
 use super::model::Model;
 use super::state::State;
 use super::{MAX_BODIES, MAX_CONTACTS, MAX_TOOLS};
@@ -33,6 +36,7 @@ impl State {
                 std::mem::swap(body, old);
             }
         }
+        self.add_series(before, previous_ranks, model);
         for (tool, old) in self.tools.iter_mut().zip(&previous_ranks.tools) {
             let Some(old) = old.and_then(|old| before.tools.get(old)) else { continue };
             (tool.previous_pose, tool.released_energy) = (old.previous_pose, old.released_energy);
@@ -60,6 +64,27 @@ impl State {
         // Pressures are allocated if some tool needs cells: where such a tool stays, both states have them.
         if self.pressures.len() == before.pressures.len() {
             std::mem::swap(&mut self.pressures, &mut before.pressures);
+        }
+    }
+
+    /// Adds series of the bodies of a new model to those that are taken over: of radii that come with it. Bodies have been exchanged
+    /// already: `before` has those of the new model. Nothing is allocated or freed.
+    fn add_series(&mut self, before: &mut State, previous_ranks: &PreviousRanks, model: &Model) {
+        for (state, old) in self.bodies.iter_mut().zip(&previous_ranks.bodies) {
+            let Some(given) = old.and_then(|old| before.bodies.get_mut(old)) else { continue };
+            for new in given.series.iter_mut().filter(|new| new.is_some()) {
+                let radius = new.as_ref().map_or(0.0, |new| new.radius);
+                if state.series(radius).is_some() {
+                    continue;
+                }
+                let is_unused = |series: &&mut Option<Arc<KnownSeries>>| {
+                    let of_tool = |radius: f64| model.tools.iter().any(|tool| tool.radius == radius);
+                    !series.as_ref().is_some_and(|series| of_tool(series.radius))
+                };
+                if let Some(place) = state.series.iter_mut().find(is_unused) {
+                    std::mem::swap(place, new);
+                }
+            }
         }
     }
 }

@@ -29,8 +29,7 @@
 
 use glam::DVec3;
 
-use super::MAX_CONTACTS;
-use super::contacts::{Contact, Mode};
+use super::contacts::Contact;
 use super::law::law_of;
 use super::model::Model;
 use super::solve::{contact_forces, own_compliance};
@@ -60,9 +59,9 @@ pub fn slip(model: &Model, state: &mut State, system: &mut System, body: usize) 
 /// One sweep over the contacts; returns whether any slipped.
 fn sweep(model: &Model, state: &mut State, system: &mut System, body: usize) -> bool {
     let mut slipped = false;
-    for slot in 0..MAX_CONTACTS {
+    for slot in state.contacts.occupied() {
         let contact = &state.contacts.slots[slot];
-        if contact.mode == Mode::Free || contact.body != body {
+        if contact.body != body {
             continue;
         }
         let Some(largest_coefficient) = law_of(contact.law).cone(contact) else { continue };

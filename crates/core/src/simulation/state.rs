@@ -1,10 +1,13 @@
 //! State of a simulation: contacts, tools, bodies.
 
+use std::sync::Arc;
+
 use glam::{DMat3, DVec3};
 
 use super::body::BodyModel;
 use super::contacts::Contacts;
 use super::input::Pose;
+use super::known_series::{KnownSeries, SeriesOfBody};
 use super::model::Model;
 use super::motion::Motion;
 use super::passivity::PassivityObserver;
@@ -49,6 +52,8 @@ pub struct BodyState {
     pub strain: Option<Box<StrainWatch>>,
     /// Share of the forces of sliding contacts within the strain limit.
     pub(super) limit_share: LimitShare,
+    /// Higher orders of its displacement by the radius of spheres.
+    pub(super) series: SeriesOfBody,
     /// Energy of the contacts of a body at rest and work of the tools.
     pub(super) passivity: PassivityObserver,
 }
@@ -68,6 +73,13 @@ pub struct State {
     pub(super) compliance: Box<[[DMat3; MAX_CONTACTS]; MAX_CONTACTS]>,
 }
 
+impl BodyState {
+    /// Coefficients at the fans for a sphere of `radius`, m.
+    pub fn series(&self, radius: f64) -> Option<&KnownSeries> {
+        self.series.iter().flatten().find(|series| series.radius == radius).map(Arc::as_ref)
+    }
+}
+
 impl State {
     /// At rest, without contacts.
     pub fn new(model: &Model) -> Self {
@@ -76,6 +88,7 @@ impl State {
             motion: body.dynamics.as_ref().map(|dynamics| Motion::new(&dynamics.modes)),
             strain: None,
             limit_share: LimitShare::default(),
+            series: std::array::from_fn(|rank| body.series.get(rank).cloned()),
             passivity: PassivityObserver::default(),
         };
         Self {

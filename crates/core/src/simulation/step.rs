@@ -139,9 +139,9 @@ fn find_forces(model: &Model, state: &mut State, scratch: &mut Scratch, body: us
         solve::contact_forces(model, state, &mut scratch.system, body);
         slip(model, state, &mut scratch.system, body);
         let mut ended = false;
-        for slot in 0..state.contacts.slots.len() {
+        for slot in state.contacts.occupied() {
             let contact = &mut state.contacts.slots[slot];
-            if contact.mode == Mode::Free || contact.body != body {
+            if contact.body != body {
                 continue;
             }
             let law = law_of(contact.law);

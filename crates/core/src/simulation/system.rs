@@ -25,8 +25,13 @@ impl System {
         let (a, x) = (&mut self.matrix, &mut self.right);
         for k in 0..n {
             let pivot = (k..n).max_by(|&i, &j| a[i][k].abs().total_cmp(&a[j][k].abs())).unwrap_or(k);
-            a.swap(k, pivot);
-            x.swap(k, pivot);
+            if pivot != k {
+                // Whole rows are several times as long as what is used of them.
+                for j in k..n {
+                    (a[k][j], a[pivot][j]) = (a[pivot][j], a[k][j]);
+                }
+                x.swap(k, pivot);
+            }
             for i in k + 1..n {
                 let factor = a[i][k] / a[k][k];
                 for j in k + 1..n {

@@ -9,7 +9,7 @@ use palpate_core::contact::{Moduli, SeriesFields};
 use palpate_core::dynamics::{Newmark, Rayleigh};
 use palpate_core::files;
 use palpate_core::green::GreensFunction;
-use palpate_core::simulation::LawKind;
+use palpate_core::simulation::{KnownSeries, LawKind};
 #[cfg(not(feature = "offline"))]
 use palpate_core::strain::StrainMeasure;
 use palpate_core::{Error, Result};
@@ -101,7 +101,7 @@ fn body(folder: &Path, described: BodyDescription) -> Result<Body> {
 }
 
 /// Series of all radii one after the other.
-fn series(arrays: &Arrays) -> Result<Vec<(f64, Arc<[SeriesFields]>)>> {
+fn series(arrays: &Arrays) -> Result<Vec<Arc<KnownSeries>>> {
     let radii: Vec<f64> = arrays.optional("series_radii", Dtype::F64, 1)?.unwrap_or_default();
     let fields: Vec<f64> = arrays.optional("series", Dtype::F64, SERIES_FIELDS)?.unwrap_or_default();
     let fields: &[SeriesFields] = fields.as_chunks().0;
@@ -109,7 +109,7 @@ fn series(arrays: &Arrays) -> Result<Vec<(f64, Arc<[SeriesFields]>)>> {
     Ok(radii
         .into_iter()
         .zip(fields.chunks_exact(each.max(1)))
-        .map(|(radius, fields)| (radius, fields.into()))
+        .map(|(radius, fields)| Arc::new(KnownSeries::new(radius, fields.to_vec(), vec![])))
         .collect())
 }
 

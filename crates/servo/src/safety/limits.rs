@@ -81,6 +81,13 @@ impl SafetyLimits {
         refuse_unless(self.max_overruns > 0, || "safety: the number of overruns must be positive, got 0".into())
     }
 
+    /// Without a limit on the time of a tick: a late force harms nobody where no device has motors, and a page's worker may be
+    /// suspended within a tick for as long as the browser or the computer likes.
+    #[must_use]
+    pub fn of_any_tick_time(self) -> Self {
+        Self { max_compute: f64::INFINITY, max_overruns: u32::MAX, ..self }
+    }
+
     /// With those of the device of a tool.
     ///
     /// # Errors

@@ -13,6 +13,7 @@ mod lift_off;
 mod no_allocation;
 mod passivity;
 mod replay;
+mod series;
 mod sliding;
 mod strikes;
 mod z_width;

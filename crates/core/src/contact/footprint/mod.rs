@@ -329,14 +329,19 @@ impl NearPiece {
     /// Weight of a piece in the contact, and that in the contact and in a wall together; `None` where the latter is zero.
     fn weigh_with_wall(&self, margin: f64) -> Option<[Weight; 2]> {
         let nearness = 1.0 - self.distance / margin;
+        if nearness <= 0.0 {
+            return None;
+        }
         let (eta, rise) = smooth_step(self.facing_cosine, FACING);
-        if nearness <= 0.0 || eta <= 0.0 {
+        if eta <= 0.0 {
             return None;
         }
         let (by_distance, by_facing) = (-2.0 * nearness * eta / margin, nearness * nearness * rise);
-        let by = [0, 1].map(|k| (self.by_pose[k] * by_distance + self.facing_cosine_by[k] * by_facing) * self.area);
+        let by_pose = |k: usize| (self.by_pose[k] * by_distance + self.facing_cosine_by[k] * by_facing) * self.area;
+        let by = [by_pose(0), by_pose(1)];
         let whole = self.area * nearness * nearness * eta;
-        Some([(whole * self.contact_share, by.map(|by| by * self.contact_share)), (whole, by)])
+        let share = self.contact_share;
+        Some([(whole * share, [by[0] * share, by[1] * share]), (whole, by)])
     }
 
     /// Share to which the piece is a wall rising over a plane: one if it is steep, or more parallel to one of the `others`, and the
@@ -426,11 +431,6 @@ pub struct NearRelief<'a> {
 }
 
 impl NearRelief<'_> {
-    fn middle(&self, piece: u32) -> DVec3 {
-        let [a, b, c] = self.fine.corners(piece);
-        (a + b + c) / 3.0
-    }
-
     /// Normal, of any length, of a piece as its wall is flattened: its slope is less by the wall's share.
     fn flattened_normal(&self, piece: &NearPiece) -> DVec3 {
         let Some((plane, others)) = &self.near.flattened_to else { return piece.normal };
@@ -440,9 +440,10 @@ impl NearRelief<'_> {
 }
 
 impl Relief for NearRelief<'_> {
-    fn end(&self, plane: &ContactPlane, direction: DVec3, lowest: f64) -> Option<SurfaceEnd> {
+    fn end(&self, plane: &ContactPlane, direction: DVec3, (lowest, enough): (f64, f64)) -> Option<SurfaceEnd> {
         let facing = |near: &&NearPiece| near.normal.dot(plane.axes.z_axis) > 0.0;
-        SurfaceEnd::of(self.near.pieces.iter().filter(facing).map(|near| near.corners), plane, direction, lowest)
+        let corners = self.near.pieces.iter().filter(facing).map(|near| near.corners);
+        SurfaceEnd::of(corners, plane, direction, (lowest, enough))
     }
 
     fn fill(&self, frame: &GridFrame, heights: &mut Heights) {
@@ -454,14 +455,16 @@ impl Relief for NearRelief<'_> {
         for near in &self.near.pieces {
             for k in 0..3 {
                 let edge = [near.corners[k], near.corners[(k + 1) % 3]];
-                let across = self.fine.across(near.piece, k).map(|neighbour| (neighbour, self.fine.normal(neighbour)));
+                let across =
+                    self.fine.across(near.piece, k).map(|neighbour| (neighbour, self.fine.piece(neighbour).normal));
                 let is_crease = self.fine.is_crease(near.piece, k);
                 if let Some((neighbour, other_normal)) = across
                     && faces(near.normal)
                     && faces(other_normal)
                 {
                     if near.piece < neighbour && is_crease {
-                        let other = NearPiece { normal: other_normal, middle: self.middle(neighbour), ..*near };
+                        let other =
+                            NearPiece { normal: other_normal, middle: self.fine.piece(neighbour).middle, ..*near };
                         heights.smooth_edge(frame, edge, [near, &other].map(|piece| self.flattened_normal(piece)));
                     }
                 } else if faces(near.normal) {

@@ -4,6 +4,7 @@ use glam::{DMat3, DVec3};
 
 use super::{OtherPlanes, Plane, PressedSurface};
 use crate::contact::shape::ToolShape;
+use crate::contact::tessellation::Piece;
 use crate::contact::{SurfaceQuery, Tessellation};
 use crate::tensor::{across, outer, skew};
 
@@ -16,6 +17,8 @@ const MAX_OPPOSITE: usize = 1024;
 const HEADROOM_SLOPE: f64 = 2.0;
 /// Depth, over the tool's half height, beyond which the viewpoint is lifted by the excess.
 const UNLIFTED_DEPTH: f64 = 0.5;
+/// Radius of a ball around a triangle that its pieces do not leave by rounding.
+const BALL_ROUNDING: f64 = 1.0 + 1e-9;
 /// Next to the viewpoint directions are blurred over this part of the tool's thickness.
 const BLUR: f64 = 0.1;
 
@@ -251,7 +254,6 @@ impl NearPieces {
         (self.centre, self.margin) = (tool.centre(), margin);
         let (centre, headroom) = (self.centre, tool.headroom(margin));
         let viewpoint = tool.viewpoint(centre);
-        let unlifted = PlacedShape { contact_normal: DVec3::ZERO, penetration: 0.0, ..*tool };
         let reach =
             |axis: DVec3| tool.support(axis).dot(axis) + margin + (headroom * tool.contact_normal.dot(axis)).max(0.0);
         let high = DVec3::from_array(DVec3::AXES.map(reach));
@@ -259,55 +261,68 @@ impl NearPieces {
         if !(low.is_finite() && high.is_finite()) {
             return;
         }
+        let lifted = View { tool, centre, headroom, viewpoint };
+        let unlifted = PlacedShape { contact_normal: DVec3::ZERO, penetration: 0.0, ..*tool };
+        let unlifted = View { tool: &unlifted, centre, headroom: 0.0, viewpoint: centre };
         query.for_each_within(low, high, |triangle| {
             let (ball, radius) = fine.ball(triangle);
             let count = fine.pieces_of_triangle() as u32;
-            let is_near = tool.distance(ball, centre, headroom).0 < radius + margin;
-            let is_opposite = unlifted.distance(ball, centre, 0.0).0 < radius + margin;
+            let is_near = lifted.distance(ball).0 < radius + margin;
+            // Up to the tool's middle both distances are the same.
+            let is_above = (ball - centre).dot(tool.contact_normal) + BALL_ROUNDING * radius > 0.0;
+            let is_full = self.pieces.len() + count as usize > MAX_PIECES;
+            let is_opposite = (is_above || is_full) && unlifted.distance(ball).0 < radius + margin;
             if !is_near && !is_opposite {
                 return;
             }
             for piece in triangle * count..(triangle + 1) * count {
-                let near = near_piece(fine, tool, piece, (centre, headroom, viewpoint));
-                if near.distance < near.size + margin && self.pieces.len() < MAX_PIECES {
-                    self.pieces.push(near);
-                } else if is_opposite {
-                    let near = near_piece(fine, &unlifted, piece, (centre, 0.0, centre));
-                    if near.distance < near.size + margin && self.opposite.len() < MAX_OPPOSITE {
-                        self.opposite.push(near);
+                match lifted.near_piece(fine, piece, margin) {
+                    Some(near) if self.pieces.len() < MAX_PIECES => self.pieces.push(near),
+                    _ if is_opposite && self.opposite.len() < MAX_OPPOSITE => {
+                        self.opposite.extend(unlifted.near_piece(fine, piece, margin));
                     }
+                    _ => {}
                 }
             }
         });
     }
 }
 
-fn near_piece(
-    fine: &Tessellation,
-    tool: &PlacedShape<'_>,
-    piece: u32,
-    (centre, headroom, viewpoint): (DVec3, f64, DVec3),
-) -> NearPiece {
-    let corners = fine.corners(piece);
-    let [a, b, c] = corners;
-    let middle = (a + b + c) / 3.0;
-    let across = (b - a).cross(c - a);
-    let size = corners.iter().map(|corner| corner.distance_squared(middle)).fold(0.0, f64::max).sqrt();
-    let (distance, by_pose, tool_normal) = tool.distance(middle, centre, headroom);
-    let (normal, area) = (across.normalize_or_zero(), 0.5 * across.length());
-    let (facing_cosine, facing_cosine_by) = tool.cosine_to_viewpoint((middle, normal), viewpoint);
-    NearPiece {
-        piece,
-        corners,
-        middle,
-        normal,
-        area,
-        size,
-        contact_share: 1.0,
-        distance,
-        by_pose,
-        tool_normal,
-        facing_cosine,
-        facing_cosine_by,
+/// A tool over the surface, with what is the same for all pieces.
+#[derive(Clone, Copy)]
+struct View<'a> {
+    tool: &'a PlacedShape<'a>,
+    centre: DVec3,
+    headroom: f64,
+    viewpoint: DVec3,
+}
+
+impl View<'_> {
+    fn distance(&self, point: DVec3) -> (f64, [DVec3; 2], DVec3) {
+        self.tool.distance(point, self.centre, self.headroom)
+    }
+
+    /// A piece within a margin of the tool.
+    fn near_piece(&self, fine: &Tessellation, piece: u32, margin: f64) -> Option<NearPiece> {
+        let &Piece { middle, normal, area, size } = fine.piece(piece);
+        let (distance, by_pose, tool_normal) = self.distance(middle);
+        if distance.is_nan() || distance >= size + margin {
+            return None;
+        }
+        let (facing_cosine, facing_cosine_by) = self.tool.cosine_to_viewpoint((middle, normal), self.viewpoint);
+        Some(NearPiece {
+            piece,
+            corners: fine.corners(piece),
+            middle,
+            normal,
+            area,
+            size,
+            contact_share: 1.0,
+            distance,
+            by_pose,
+            tool_normal,
+            facing_cosine,
+            facing_cosine_by,
+        })
     }
 }

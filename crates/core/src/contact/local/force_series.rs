@@ -22,11 +22,14 @@
 //! friction it is a small part of the pressing one. Beyond the force `F_e` at which the series ends the powers go on as straight
 //! lines, `F^k -> F_e^k + k F_e^(k-1) (F - F_e)`, so that no energy comes from outside the series' range.
 //!
+//! Where the series is known at a part `p` of the fans only, the others count with zeros: the energy is a mean, of the part `p` of the
+//! series and of a body that stays linear. Each ends at its own force, so that `1/F_e` is the mean over the fans with a series.
+//!
 //! A stiffness `s` times as high has `U_s(f) = s U(f/s)`.
 
 use glam::{DMat3, DVec3};
 
-use crate::contact::smooth::Blended;
+use crate::contact::smooth::{Blended, FanWeights};
 use crate::tensor::outer;
 
 /// Numbers at a fan.
@@ -42,6 +45,21 @@ const BENDING: usize = 8;
 /// Newton steps to `y`; four give all digits. None follows one shorter than this part of the force.
 const STEPS: usize = 6;
 const SETTLED: f64 = 1e-9;
+
+/// Whether a series is known.
+pub fn is_known(fields: &SeriesFields) -> bool {
+    fields[ENDING] > 0.0
+}
+
+/// Fields at a place, and the part of it where they are known.
+pub fn blended_series(series: &[SeriesFields], weights: &FanWeights) -> (Blended<SERIES_FIELDS>, f64) {
+    let mut blended = weights.blend(series);
+    let share = weights.share(|fan| is_known(&series[fan]));
+    if share.0 > 0.0 && share.0 < 1.0 {
+        blended.divide(ENDING, share);
+    }
+    (blended, share.0)
+}
 
 /// Displacement, energy and their derivatives at one force.
 #[derive(Clone, Copy, Debug, PartialEq)]

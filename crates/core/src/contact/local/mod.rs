@@ -17,7 +17,7 @@ mod widening;
 
 pub use contact_plane::{ContactPlane, ToolPose};
 pub use finite_strain::{DEEPEST_FIT, StrainTerms, correct_sphere, terms_with_pad};
-pub use force_series::{HigherOrders, SERIES_FIELDS, SeriesFields, higher_orders};
+pub use force_series::{HigherOrders, SERIES_FIELDS, SeriesFields, blended_series, higher_orders};
 pub use friction::{Friction, FrictionResponse};
 pub use modulus::effective_modulus;
 pub use sphere::{SphereContact, indent_sphere};

@@ -44,11 +44,23 @@ pub struct WidenedContact {
 
 impl Widening {
     /// A sphere of effective `radius` (m) that approaches a half-space of modulus `E*` (Pa) and of coefficients of finite strain by
-    /// `approach` (m).
-    pub fn indent(self, approach: f64, radius: f64, effective_modulus: f64, terms: &StrainTerms) -> WidenedContact {
+    /// `approach` (m); a linear body has none.
+    pub fn indent(
+        self,
+        approach: f64,
+        radius: f64,
+        effective_modulus: f64,
+        terms: Option<&StrainTerms>,
+    ) -> WidenedContact {
         let indent = |approach: f64| {
-            let correction = correct_sphere(approach, radius, effective_modulus, terms);
-            (indent_sphere(approach, radius, effective_modulus).corrected(&correction), correction)
+            let sphere = indent_sphere(approach, radius, effective_modulus);
+            match terms {
+                Some(terms) => {
+                    let correction = correct_sphere(approach, radius, effective_modulus, terms);
+                    (sphere.corrected(&correction), correction)
+                }
+                None => (sphere, StrainCorrection::default()),
+            }
         };
         let whole = approach.max(0.0);
         let mut own = whole;
@@ -128,7 +140,7 @@ mod tests {
     fn force_and_stiffness_are_derivatives_of_the_energy() {
         for widening in widenings() {
             for depth in [0.02, 0.1, 0.3, 0.8].map(|d| d * RADIUS) {
-                let at = |d: f64| widening.indent(d, RADIUS, MODULUS, &TERMS).sphere;
+                let at = |d: f64| widening.indent(d, RADIUS, MODULUS, Some(&TERMS)).sphere;
                 let contact = at(depth);
                 assert!((slope(|d| at(d).energy, depth) / contact.force - 1.0).abs() < 1e-6, "{widening:?} {depth}");
                 assert!((slope(|d| at(d).force, depth) / contact.stiffness - 1.0).abs() < 1e-6, "{widening:?} {depth}");
@@ -141,9 +153,9 @@ mod tests {
         for widening in widenings() {
             let depth = 0.3 * RADIUS;
             let energy = |rate, radius, modulus| {
-                Widening { rate, ..widening }.indent(depth, radius, modulus, &TERMS).sphere.energy
+                Widening { rate, ..widening }.indent(depth, radius, modulus, Some(&TERMS)).sphere.energy
             };
-            let contact = widening.indent(depth, RADIUS, MODULUS, &TERMS);
+            let contact = widening.indent(depth, RADIUS, MODULUS, Some(&TERMS));
             let close = |a: f64, b: f64| (a - b).abs() < 1e-6 * b.abs().max(1e-3 * contact.sphere.energy);
             assert!(close(slope(|r| energy(widening.rate, r, MODULUS), RADIUS), contact.sphere.energy_by_radius));
             assert!(close(slope(|e| energy(widening.rate, RADIUS, e), MODULUS), contact.energy_by_modulus));
@@ -160,6 +172,6 @@ mod tests {
         let area = hertz_area(alone.force, RADIUS, MODULUS);
         let widening = Widening { rate: 0.5 / (MODULUS * RADIUS.powi(3)), reference: area };
         let approach = 0.25 * RADIUS + widening.rate * alone.force * area / 3.0;
-        assert!((widening.indent(approach, RADIUS, MODULUS, &[0.0; 3]).sphere.force / alone.force - 1.0).abs() < 1e-12);
+        assert!((widening.indent(approach, RADIUS, MODULUS, None).sphere.force / alone.force - 1.0).abs() < 1e-12);
     }
 }

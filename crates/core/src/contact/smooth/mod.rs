@@ -97,6 +97,12 @@ impl SmoothSurface {
         self.touchable[fan as usize]
     }
 
+    /// All fans that may have weight at a foot on a triangle.
+    pub fn fans_reaching(&self, triangle: u32) -> &[u32] {
+        let [from, _, to] = self.ranges[triangle as usize];
+        &self.reaching[from as usize..to as usize]
+    }
+
     /// Whether each edge of a triangle is a crease.
     pub fn creases_of(&self, triangle: u32) -> [bool; 3] {
         self.creases[triangle as usize]

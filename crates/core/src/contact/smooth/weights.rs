@@ -39,11 +39,26 @@ pub struct Blended<const N: usize> {
     slopes: [[f64; N]; 3],
 }
 
+impl<const N: usize> Default for Blended<N> {
+    fn default() -> Self {
+        Self { values: [0.0; N], slopes: [[0.0; N]; 3] }
+    }
+}
+
 impl<const N: usize> Blended<N> {
     /// From values and their gradients.
     #[cfg(test)]
     pub fn from_parts(values: [f64; N], slopes: [DVec3; N]) -> Self {
         Self { values, slopes: std::array::from_fn(|axis| slopes.map(|slope| slope[axis])) }
+    }
+
+    /// Divides a field by a positive number with a gradient.
+    pub fn divide(&mut self, field: usize, (by, slope): (f64, DVec3)) {
+        let value = self.values[field] / by;
+        for (along, slope) in self.slopes.iter_mut().zip(slope.to_array()) {
+            along[field] = (along[field] - value * slope) / by;
+        }
+        self.values[field] = value;
     }
 
     /// Gradient of a field by the tool's place.
@@ -124,35 +139,67 @@ impl FanWeights {
         self.iter().zip(&self.gradients).map(|((fan, weight), &gradient)| (fan, weight, gradient))
     }
 
+    /// Part of the weight on some of the fans, and its gradient; exactly one where it is all.
+    pub fn share(&self, counts: impl Fn(usize) -> bool) -> (f64, DVec3) {
+        let (mut share, mut slope, mut all) = (0.0, DVec3::ZERO, true);
+        for (fan, weight, gradient) in self.with_gradients() {
+            if counts(fan) {
+                share += weight;
+                slope += gradient;
+            } else {
+                all &= weight == 0.0;
+            }
+        }
+        if all { (1.0, DVec3::ZERO) } else { (share, slope) }
+    }
+
     /// Fields known at the fans, and their gradients.
     pub fn blend<const N: usize>(&self, fields: &[[f64; N]]) -> Blended<N> {
-        self.arch.dispatch(Blending { weights: self, fields })
+        let mut blended = Blended::default();
+        self.blend_part::<N, N>(fields, 0, &mut blended);
+        blended
+    }
+
+    /// Blends `M` of the fields, from `first` on.
+    pub fn blend_part<const N: usize, const M: usize>(
+        &self,
+        fields: &[[f64; N]],
+        first: usize,
+        blended: &mut Blended<N>,
+    ) {
+        self.arch.dispatch(Blending::<N, M> { weights: self, fields, first, blended });
     }
 }
 
 /// The sums as a struct: a closure might be compiled for the narrowest vectors.
-struct Blending<'a, const N: usize> {
+struct Blending<'a, const N: usize, const M: usize> {
     weights: &'a FanWeights,
     fields: &'a [[f64; N]],
+    first: usize,
+    blended: &'a mut Blended<N>,
 }
 
-impl<const N: usize> NullaryFnOnce for Blending<'_, N> {
-    type Output = Blended<N>;
+impl<const N: usize, const M: usize> NullaryFnOnce for Blending<'_, N, M> {
+    type Output = ();
 
     #[inline(always)]
-    fn call(self) -> Blended<N> {
-        let (mut values, mut slopes) = ([0.0; N], [[0.0; N]; 3]);
+    fn call(self) {
+        let (mut values, mut slopes) = ([0.0; M], [[0.0; M]; 3]);
         let FanWeights { count, fans, weights, gradients, .. } = self.weights;
         for ((&fan, &weight), gradient) in fans[..*count].iter().zip(weights).zip(gradients) {
-            let own = &self.fields[fan as usize];
-            for k in 0..N {
+            let own = &self.fields[fan as usize][self.first..self.first + M];
+            for k in 0..M {
                 values[k] += weight * own[k];
                 slopes[0][k] += gradient.x * own[k];
                 slopes[1][k] += gradient.y * own[k];
                 slopes[2][k] += gradient.z * own[k];
             }
         }
-        Blended { values, slopes }
+        let part = self.first..self.first + M;
+        self.blended.values[part.clone()].copy_from_slice(&values);
+        for (to, slope) in self.blended.slopes.iter_mut().zip(slopes) {
+            to[part.clone()].copy_from_slice(&slope);
+        }
     }
 }
 

@@ -46,4 +46,5 @@ pub use plan::Plan;
 pub use problem::Problem;
 pub use rate::products;
 pub use run::{plan, precompute, precompute_to};
+pub(crate) use spatial_order::spatial_order;
 pub use tasks::Progress;

@@ -164,7 +164,7 @@ impl Contacts {
     }
 
     /// Slots that are not empty.
-    fn occupied(&self) -> impl Iterator<Item = usize> + use<> {
+    pub(super) fn occupied(&self) -> impl Iterator<Item = usize> + use<> {
         let mut left = self.occupied;
         std::iter::from_fn(move || {
             let slot = left.trailing_zeros() as usize;

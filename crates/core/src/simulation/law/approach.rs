@@ -57,8 +57,7 @@ impl<'a> Approach<'a> {
         let tool_input = &input.tools[tool];
         let position = model.bodies[body].placement.point_to_body(tool_input.pose.position);
         let contact_radius = input.controls.contact_radius[tool];
-        let orientation =
-            DQuat::from_mat3(&model.bodies[body].placement.rotation.transpose()) * tool_input.pose.orientation;
+        let orientation = model.frames[body] * tool_input.pose.orientation;
         let before = tool_state.previous_pose.unwrap_or(tool_input.pose);
         let displacement = position - model.bodies[body].placement.point_to_body(before.position);
         let rotation_angle = rotation_vector(before.orientation, tool_input.pose.orientation).length();

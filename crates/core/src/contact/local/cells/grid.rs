@@ -16,6 +16,8 @@ use crate::math::hypot;
 const MAX_SUPPORT_STEPS: usize = 50;
 /// Height of a straight arc of the tool over its chord, over the tool's size: such an arc is 3e-7 long.
 const STRAIGHT: f64 = 1e-14;
+/// Distance over the tool's size by which the surface reaches beyond a side whatever the rounding.
+const BEYOND: f64 = 1e-9;
 /// Least sine of the angle between a tool's long axis and the normal for the grid to follow that axis; the square is the least
 /// difference of its extents along the grid's axes.
 const LEAST_SINE: f64 = 1e-3;
@@ -125,11 +127,13 @@ impl ToolInSurfaceFrame<'_> {
         RectangleSide::of_tool(direction.dot(support), gradient, support)
     }
 
-    /// The same rectangle, cut where the surface above the tool's lowest point ends. `end` returns that end along a direction.
-    pub fn within(&self, rectangle: Rectangle, end: impl Fn(DVec3) -> Option<(DVec3, f64)>) -> Rectangle {
+    /// The same rectangle, cut where the surface above the tool's lowest point ends. `end` returns that end along a direction, unless
+    /// it is surely beyond a coordinate.
+    pub fn within(&self, rectangle: Rectangle, end: impl Fn(DVec3, f64) -> Option<(DVec3, f64)>) -> Rectangle {
         let lowest = self.support(DVec3::NEG_Z);
+        let rounding = BEYOND * self.shape.bounding_radius();
         let shorter = |side: RectangleSide, direction: DVec3| {
-            let Some((point, by_level)) = end(direction) else { return side };
+            let Some((point, by_level)) = end(direction, side.coordinate + rounding) else { return side };
             let coordinate = point.dot(direction);
             if coordinate >= side.coordinate {
                 return side;

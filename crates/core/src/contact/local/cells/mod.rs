@@ -211,8 +211,8 @@ impl CellProblem<'_> {
         if !(depth > 0.0 && depth.is_finite()) {
             return None;
         }
-        let rectangle = tool.within(tool.rectangle(), |direction| {
-            let end = relief.end(&self.plane, self.plane.axes * direction, -depth)?;
+        let rectangle = tool.within(tool.rectangle(), |direction, enough| {
+            let end = relief.end(&self.plane, self.plane.axes * direction, (-depth, enough))?;
             Some((to_plane * (end.point - self.plane.origin), end.by_level))
         });
         let cells = Cells::new(rectangle, self.resolution.cells(), self.effective_modulus);

@@ -48,12 +48,13 @@ pub struct SurfaceEnd {
 }
 
 impl SurfaceEnd {
-    /// The end of triangles along a direction, above a level of the plane.
+    /// The end of triangles along a direction, above a level of the plane. `None` also where they reach farther than `enough`: most
+    /// tools do not reach the end of the surface, and a few triangles show it.
     pub fn of(
         triangles: impl Iterator<Item = [DVec3; 3]>,
         plane: &ContactPlane,
         direction: DVec3,
-        level: f64,
+        (level, enough): (f64, f64),
     ) -> Option<Self> {
         let mut end: Option<(f64, Self)> = None;
         let mut reach = |point: DVec3, by_level: f64| {
@@ -61,18 +62,23 @@ impl SurfaceEnd {
             if end.is_none_or(|(farthest, _)| along > farthest) {
                 end = Some((along, Self { point, by_level }));
             }
+            along > enough
         };
         for corners in triangles {
+            let mut is_beyond = false;
             let heights = corners.map(|corner| (corner - plane.origin).dot(plane.axes.z_axis) - level);
             for k in 0..3 {
                 let (from, to) = ((corners[k], heights[k]), (corners[(k + 1) % 3], heights[(k + 1) % 3]));
                 if from.1 >= 0.0 {
-                    reach(from.0, 0.0);
+                    is_beyond |= reach(from.0, 0.0);
                 }
                 if (from.1 < 0.0) != (to.1 < 0.0) {
                     let by_height = (to.0 - from.0) / (to.1 - from.1);
-                    reach(from.0 - by_height * from.1, by_height.dot(direction));
+                    is_beyond |= reach(from.0 - by_height * from.1, by_height.dot(direction));
                 }
+            }
+            if is_beyond {
+                return None;
             }
         }
         end.map(|(_, end)| end)
@@ -84,8 +90,8 @@ pub trait Relief {
     /// Adds its heights.
     fn fill(&self, frame: &GridFrame, heights: &mut Heights);
 
-    /// End along a direction in the plane of the part higher than `lowest`, m; none if it has no end.
-    fn end(&self, _plane: &ContactPlane, _direction: DVec3, _lowest: f64) -> Option<SurfaceEnd> {
+    /// End along a direction in the plane of the part higher than `lowest`, m; none if it has no end, or none before `enough`.
+    fn end(&self, _plane: &ContactPlane, _direction: DVec3, (_lowest, _enough): (f64, f64)) -> Option<SurfaceEnd> {
         None
     }
 }

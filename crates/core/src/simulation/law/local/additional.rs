@@ -59,6 +59,9 @@ pub fn find_additional_contacts(
 
 /// Searches for contacts beside the one in `slot`.
 fn find_beside(model: &Model, state: &mut State, memory: &mut TickMemory<'_>, concavities: &Concavities, slot: usize) {
+    if concavities.starts(state.contacts.slots[slot].local.foot.triangle).is_empty() {
+        return;
+    }
     let Contact { tool, body, local, .. } = state.contacts.slots[slot];
     let (fixed, radius) = (&model.bodies[body], model.tools[tool].radius);
     let Some(own) = &fixed.local else { return };

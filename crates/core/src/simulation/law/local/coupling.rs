@@ -47,7 +47,7 @@ pub fn couple(model: &Model, state: &mut State, local: &mut LocalScratch, slots:
             }
             local.others[a].turn += turn;
             if merged > 0.0
-                && let Some(own_body) = local_body(model, state, tool, body)
+                && let Some(own_body) = local_body(model, &state.bodies, tool, body)
             {
                 let mut shared = DVec3::ZERO;
                 for (fan, _, gradient) in local.weights[a].with_gradients() {

@@ -1,6 +1,6 @@
 //! Energy surplus of contacts under the local law over the work of the tools, and its removal.
 
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 
 use super::foot_jumps::contact_depth;
 use super::scratch::LocalScratch;
@@ -63,7 +63,7 @@ fn observed_contacts<'a>(
             (contact.local.tool_position, contact.local.orientation),
             |before| {
                 let placement = &model.bodies[contact.body].placement;
-                let orientation = DQuat::from_mat3(&placement.rotation.transpose()) * before.orientation;
+                let orientation = model.frames[contact.body] * before.orientation;
                 (placement.point_to_body(before.position), orientation)
             },
         );
@@ -71,7 +71,7 @@ fn observed_contacts<'a>(
         let tool = &model.tools[contact.tool];
         ObservedContact {
             slot,
-            number: Some(contact.serial >> REVISIONS),
+            number: contact.serial >> REVISIONS,
             position: local.free_positions[a],
             orientation: contact.local.orientation,
             largest_motion: contact.local.tool_position.distance(before.0) + 2.0 * tool.shape.bounding_radius() * angle,

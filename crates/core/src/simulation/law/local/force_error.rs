@@ -91,15 +91,21 @@ pub struct ForceError {
     pub held: f64,
 }
 
-/// Estimates the error of a contact's force; zero for a linear material.
-pub fn estimate(tool: &ToolModel, contact: &Contact, response: &LocalResponse, around: &Surroundings) -> ForceError {
+/// Estimates the error of a contact's force; zero for a linear material, whose surroundings are not found.
+pub fn estimate(
+    tool: &ToolModel,
+    contact: &Contact,
+    response: &LocalResponse,
+    surroundings: impl FnOnce() -> Surroundings,
+) -> ForceError {
     let indentation = &response.indentation;
     let material = &indentation.material;
     if material.strain_terms == [0.0; 3] || indentation.force == 0.0 {
         return ForceError { relative: 0.0, held: 1.0 };
     }
+    let around = surroundings();
     let inverse_thickness = around.inverse_thickness;
-    let fraction = response.has_series().then_some(response.higher.fraction.max(0.0));
+    let (known, fraction) = (response.known, response.higher.fraction.max(0.0));
     // Above a support the approach of the half-space is larger than the tool's.
     let depth = if contact.depth > 0.0 { contact.depth } else { indentation.depth };
     let free = ((1.0 - indentation.depth / depth - SUPPORTED) / -SUPPORTED).clamp(0.0, 1.0);
@@ -108,10 +114,8 @@ pub fn estimate(tool: &ToolModel, contact: &Contact, response: &LocalResponse, a
         BY_ELEMENTS * indentation.force * material.share / (material.modulus * material.width * depth),
         by_size(response, around, (free, depth)),
         local_error(tool, response),
-        match fraction {
-            Some(fraction) => BY_SERIES * 0.01 * fraction.powi(3),
-            None => BY_DEPTH * ((depth + around.by_loads.length()) * inverse_thickness).powi(2),
-        },
+        known * BY_SERIES * 0.01 * fraction.powi(3),
+        (1.0 - known) * BY_DEPTH * ((depth + around.by_loads.length()) * inverse_thickness).powi(2),
         BY_OTHERS * around.by_others.length() / depth * (depth / indentation.effective_radius).min(1.0),
         sticking(material.poisson) * (around.friction / STICKING).min(1.0),
     ];
@@ -119,7 +123,7 @@ pub fn estimate(tool: &ToolModel, contact: &Contact, response: &LocalResponse, a
     let most = (MOST_RADII * indentation.effective_radius).min(MOST_THICKNESS / inverse_thickness);
     let beyond = if tool.shape.needs_cells() { 0.0 } else { (indentation.depth - most).max(0.0) };
     let local = 1.0 - (indentation.stiffness * beyond / indentation.force).clamp(0.0, 1.0);
-    let series = fraction.map_or(1.0, |fraction| (SERIES_REACH / fraction.max(SERIES_REACH)).min(1.0));
+    let series = 1.0 - known * (1.0 - SERIES_REACH / fraction.max(SERIES_REACH));
     let held = local.min(series);
     // The force that is held would go on growing.
     ForceError { relative: parts.iter().sum::<f64>() + (1.0 - held), held }

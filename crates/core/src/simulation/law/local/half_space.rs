@@ -21,6 +21,8 @@ pub struct LocalBody<'a> {
     pub pressed_surface: Option<&'a PressedSurface>,
     /// Young's modulus over the Green's function's.
     pub scale: f64,
+    /// Whether a material at its surface has a law beyond small strain.
+    pub is_hyperelastic: bool,
 }
 
 /// The tool and its friction.
@@ -83,11 +85,15 @@ impl HalfSpace {
         let tangential = 2.0 * (1.0 - poisson) / (2.0 - poisson);
         let body_terms: StrainTerms = std::array::from_fn(|k| fields.values[STRAIN_TERMS.start + k]);
         let share = whole / own;
-        let (strain_terms, by_own) = terms_with_pad(&body_terms, share, own);
-        let body_slope = fields.slope(PLANE_STRAIN) * body.scale;
-        let strain_slopes = std::array::from_fn(|k| {
-            fields.slope(STRAIN_TERMS.start + k) * share.powi(k as i32 + 2) + body_slope * by_own[k]
-        });
+        let (mut strain_terms, mut strain_slopes) = ([0.0; 3], [DVec3::ZERO; 3]);
+        if body.is_hyperelastic {
+            let by_own;
+            (strain_terms, by_own) = terms_with_pad(&body_terms, share, own);
+            let body_slope = fields.slope(PLANE_STRAIN) * body.scale;
+            strain_slopes = std::array::from_fn(|k| {
+                fields.slope(STRAIN_TERMS.start + k) * share.powi(k as i32 + 2) + body_slope * by_own[k]
+            });
+        }
         Self {
             material: LocalMaterial { poisson, strain_terms: body_terms, share, modulus, width: fields.values[WIDTH] },
             modulus,

@@ -6,9 +6,11 @@ use super::half_space::{Fields, HalfSpace, Indentation, LocalBody, LocalTool};
 use super::wrench::{CellMemory, indent_shape, placed_shape};
 use crate::contact::footprint::PressedSurface;
 use crate::contact::local::{
-    Friction, FrictionResponse, HigherOrders, SERIES_FIELDS, WidenedContact, Widening, higher_orders,
+    Friction, FrictionResponse, HigherOrders, SERIES_FIELDS, WidenedContact, Widening, blended_series, higher_orders,
 };
-use crate::contact::regular::{COMPLIANCE, GAUSS, MEAN, PLANE_STRAIN, WIDENING, WIDTH, compliance_of, reference_area};
+use crate::contact::regular::{
+    COMPLIANCE, GAUSS, MEAN, PLANE_STRAIN, WIDENING, WIDTH, blend_fields, compliance_of, reference_area,
+};
 use crate::contact::shape::ToolShape;
 use crate::contact::smooth::{Blended, FanWeights, FootPoint};
 use crate::math::hypot;
@@ -75,6 +77,8 @@ pub struct LocalResponse {
     pub higher: HigherOrders,
     higher_at_guess: HigherOrders,
     series: Option<Blended<SERIES_FIELDS>>,
+    /// Part of the place where they are known.
+    pub known: f64,
     scale: f64,
     /// Offset of the tool along the surface from above its contact, m, and its distance from the contact, m.
     pub offset: DVec3,
@@ -105,21 +109,22 @@ pub struct Guess<'a> {
     pub offset: DVec3,
 }
 
-/// Evaluates the response to the tool at a position. `None` where the body is not touchable.
+/// Writes the response to the tool at a position into `response`, without copies of that large struct. `None`, and nothing is
+/// written, where the body is not touchable.
 pub fn evaluate(
     body: LocalBody<'_>,
     tool: LocalTool<'_>,
     contact: &LocalContact,
     guess: Guess<'_>,
     others: OtherContacts,
-    weights: &mut FanWeights,
     cells: CellMemory<'_>,
-) -> Option<LocalResponse> {
+    (weights, response): (&mut FanWeights, &mut LocalResponse),
+) -> Option<()> {
     // Set again with each foot.
     weights.touchable = 1.0;
     match body.pressed_surface {
-        Some(pressed) => evaluate_shape((body, pressed), tool, contact, guess, others, weights, cells),
-        None => evaluate_sphere(body, tool, contact, guess, others, weights),
+        Some(pressed) => evaluate_shape((body, pressed), tool, contact, guess, others, cells, (weights, response)),
+        None => evaluate_sphere(body, tool, contact, guess, others, (weights, response)),
     }
 }
 
@@ -135,8 +140,8 @@ fn evaluate_sphere(
     contact: &LocalContact,
     guess: Guess<'_>,
     others: OtherContacts,
-    weights: &mut FanWeights,
-) -> Option<LocalResponse> {
+    (weights, response): (&mut FanWeights, &mut LocalResponse),
+) -> Option<()> {
     let foot = match contact.is_fading {
         true => contact.foot.frozen(guess.place),
         false => body.smooth.foot(body.drawn, guess.place - guess.offset, guess.foot, &mut weights.near)?,
@@ -149,15 +154,18 @@ fn evaluate_sphere(
     if weights.is_outside() {
         return None;
     }
-    let fields = weights.blend(body.fields);
+    let fields = blend_fields(weights, body.fields, body.is_hyperelastic);
     // A new contact has no force: its approach counts from the present depth.
     let indentation = match contact.is_new {
         true => Indentation::default(),
         false => indent(body, tool, contact, (&foot, distance), &fields),
     };
-    let mut response = LocalResponse::at(body, foot, &fields, indentation);
+    *response = LocalResponse::at(body, foot, &fields, indentation);
     response.slope = slope(body, guess.force, others, &fields);
-    response.series = body.series.map(|series| weights.blend(series));
+    if let Some(series) = body.series {
+        let (blended, known) = blended_series(series, weights);
+        (response.series, response.known) = (Some(blended), known);
+    }
     response.distance = distance;
     response.guess = ForceGuess { force: guess.force, friction: guess.friction, offset: guess.offset };
     if response.series.is_some() {
@@ -167,7 +175,7 @@ fn evaluate_sphere(
         response.slope_by_force = compliance_slope(body, guess.force, &fields) + higher.slope_by_force;
     }
     response.find_force(tool, contact, guess.place, others);
-    Some(response)
+    Some(())
 }
 
 fn evaluate_shape(
@@ -176,9 +184,9 @@ fn evaluate_shape(
     contact: &LocalContact,
     guess: Guess<'_>,
     others: OtherContacts,
-    weights: &mut FanWeights,
     cells: CellMemory<'_>,
-) -> Option<LocalResponse> {
+    (weights, response): (&mut FanWeights, &mut LocalResponse),
+) -> Option<()> {
     let Guess { place, force, .. } = guess;
     let shape = placed_shape(tool.shape, contact, place);
     cells.footprint.near.find(pressed, body.drawn.query, &shape);
@@ -186,7 +194,7 @@ fn evaluate_shape(
     let Some(footprint) = footprint else {
         // The tool is away from the body: no force.
         let compliance = DMat3::ZERO;
-        return Some(LocalResponse {
+        *response = LocalResponse {
             foot: contact.foot,
             compliance,
             jacobian: DMat3::ZERO,
@@ -194,12 +202,13 @@ fn evaluate_shape(
             offset_by_position: DMat3::ZERO,
             friction_by_position: DMat3::ZERO,
             ..LocalResponse::default()
-        });
+        };
+        return Some(());
     };
     if weights.is_outside() {
         return None;
     }
-    let fields = weights.blend(&pressed.fields);
+    let fields = blend_fields(weights, &pressed.fields, body.is_hyperelastic);
     let half_space = HalfSpace::new(body, tool, &fields, contact.part);
     // Gradients by the tool's rotation of `E*`, of the width, and of `f^T C_reg f / 2`.
     let motion_turn = others.motion_turn.map_or(DVec3::ZERO, |motion_turn| motion_turn * force);
@@ -220,11 +229,11 @@ fn evaluate_shape(
         (&half_space, [modulus_turns, width_turns]),
         cells,
     );
-    let mut response = LocalResponse::at(body, footprint.foot(place), &fields, indentation);
+    *response = LocalResponse::at(body, footprint.foot(place), &fields, indentation);
     response.point = place + indentation.lever;
     (response.slope, response.turn) = (slope(body, force, others, &fields), compliance_turns);
     response.find_force(tool, contact, place, others);
-    Some(response)
+    Some(())
 }
 
 /// Force on the tool from the gradients of the body's compliance and of its motion, N. It is computed from the guessed force, which
@@ -268,7 +277,7 @@ fn indent(
     let rate_slope = fields.slope(WIDENING) / body.scale;
     let widening = Widening { rate: fields.values[WIDENING] / body.scale, reference: reference_area(tool.radius) };
     let WidenedContact { sphere, energy_by_modulus, energy_by_rate, energy_by_terms } =
-        widening.indent(depth, radius, half_space.modulus, &half_space.strain_terms);
+        widening.indent(depth, radius, half_space.modulus, body.is_hyperelastic.then_some(&half_space.strain_terms));
     let by_terms: DVec3 = half_space.strain_slopes.iter().zip(energy_by_terms).map(|(&slope, by)| slope * by).sum();
     let gradient = radius_slope * sphere.energy_by_radius
         + half_space.slope * energy_by_modulus
@@ -292,6 +301,7 @@ fn indent(
 
 impl LocalResponse {
     /// At a foot, without a force.
+    #[inline(always)]
     fn at(body: LocalBody<'_>, foot: FootPoint, fields: &Fields, indentation: Indentation) -> Self {
         let compliance = compliance_of(&fields.values) * (1.0 / body.scale);
         let (normal, point) = (foot.normal, foot.position);
@@ -312,11 +322,6 @@ impl LocalResponse {
             friction_by_position: DMat3::ZERO,
             ..Self::default()
         }
-    }
-
-    /// Whether higher orders of the body's displacement are known.
-    pub fn has_series(&self) -> bool {
-        self.series.is_some()
     }
 
     /// Higher orders of the body's displacement at a force, N.

@@ -10,7 +10,7 @@ use crate::contact::smooth::{FanWeights, FootPoint, SmoothSurface};
 use crate::math::pow;
 use crate::simulation::MAX_CONTACTS;
 use crate::simulation::model::Model;
-use crate::simulation::state::State;
+use crate::simulation::state::BodyState;
 use crate::simulation::weight_scratch::neighbourhood;
 use crate::tensor::outer;
 
@@ -230,16 +230,20 @@ impl LocalScratch {
 }
 
 /// Data of a body for a tool; `None` if the local law is not prepared.
-pub fn local_body<'a>(model: &'a Model, state: &State, tool: usize, body: usize) -> Option<LocalBody<'a>> {
-    let fixed = &model.bodies[body];
+pub fn local_body<'a>(model: &'a Model, bodies: &'a [BodyState], tool: usize, body: usize) -> Option<LocalBody<'a>> {
+    let (fixed, state, tool_model) = (&model.bodies[body], &bodies[body], &model.tools[tool]);
     let local = fixed.local.as_ref()?;
     let regular = model.regular_compliances[tool][body].as_deref()?;
+    // A body in motion is displaced by its modes, which are linear.
+    let has_series = !fixed.moves() && !tool_model.shape.needs_cells();
+    let series = has_series.then(|| state.series(tool_model.radius)).flatten();
     Some(LocalBody {
         drawn: fixed.drawn(),
         smooth: &local.smooth,
         fields: &regular.fields,
-        series: regular.series.as_deref(),
+        series: series.map(|series| &series.fields[..]),
         pressed_surface: model.pressed_surfaces[tool][body].as_deref(),
-        scale: state.bodies[body].stiffness_scale,
+        scale: state.stiffness_scale,
+        is_hyperelastic: local.is_hyperelastic,
     })
 }

@@ -23,7 +23,7 @@ use super::scratch::{LocalScratch, TrustRegion, local_body};
 use super::wrench::{CellMemory, placed_shape};
 use crate::contact::local::FrictionResponse;
 use crate::contact::local::cells::Resolution;
-use crate::contact::regular::WIDTH;
+use crate::contact::regular::{WIDTH, blend_fields};
 use crate::contact::{Refusal, patch_weights};
 use crate::simulation::MAX_CONTACTS;
 use crate::simulation::contacts::{Contact, Mode};
@@ -276,7 +276,7 @@ fn follow_motion(
             }
             None => own.smooth.weigh(foot, weights),
         }
-        let wide = weights.blend(&regular.fields).values[WIDTH];
+        let wide = blend_fields(weights, &regular.fields, false).values[WIDTH];
         let centre = fixed.material_point(&fixed.surface_point(foot));
         let (surface, patches) = (&fixed.green.surface, &mut weight_scratch.patches[body]);
         // Its nodes fit, for those at the fans around do.
@@ -323,21 +323,19 @@ fn evaluate_contacts(
             local.footprint.others = other_planes(&state.contacts, slot);
         }
         let tool = state.contacts.slots[slot].tool;
-        let response = local_body(model, state, tool, body).and_then(|surface| {
+        let response = local_body(model, &state.bodies, tool, body).and_then(|surface| {
             let LocalScratch { positions, responses, others, weights, cells, footprint, no_pressures, .. } =
                 &mut *local;
             let contact = &state.contacts.slots[slot].local;
             let pressures = state.pressures.get_mut(slot).unwrap_or(no_pressures);
             let cells = CellMemory { state: pressures, scratch: cells, footprint, resolution };
             let tool = local_tool(model, controls, tool);
-            let LocalResponse { force, foot, offset, friction, .. } = &responses[a];
-            let (force, friction) = (*force, friction.force);
-            let guess = Guess { place: positions[a], force, friction, foot, offset: *offset };
-            evaluate(surface, tool, contact, guess, others[a], &mut weights[a], cells)
+            let LocalResponse { force, foot, offset, friction, .. } = responses[a];
+            let guess = Guess { place: positions[a], force, friction: friction.force, foot: &foot, offset };
+            evaluate(surface, tool, contact, guess, others[a], cells, (&mut weights[a], &mut responses[a]))
         });
         match response {
-            Some(response) => {
-                local.responses[a] = response;
+            Some(()) => {
                 local.pressed_slot = contact_needs_cells(model, state, slot).then_some(slot);
             }
             None => {
@@ -451,9 +449,9 @@ fn store_results(
         contact.energy = indentation.energy + response.springs().energy();
         contact.dissipated = response.friction.dissipated;
         contact.depth = contact_depth(&model.tools[tool], contact, contact.local.tool_position);
-        let around = surroundings(model, state, local, (slots, a), body, controls);
+        let around = || surroundings(model, state, local, (slots, a), body, controls);
+        let ForceError { relative, held } = estimate(&model.tools[tool], &state.contacts.slots[slot], response, around);
         let contact: &mut Contact = &mut state.contacts.slots[slot];
-        let ForceError { relative, held } = estimate(&model.tools[tool], contact, response, &around);
         (contact.error, contact.held) = (relative, held);
         if !continue_contact(&model.tools[tool], contact) {
             state.contacts.clear(slot);

@@ -160,6 +160,7 @@ mod tests {
                 series: None,
                 pressed_surface: Some(&pressed),
                 scale: 1.0,
+                is_hyperelastic: true,
             };
             let tool = LocalTool { shape, radius: shape.bounding_radius(), pad: None, coefficient: 0.0 };
             let mut contact = LocalContact { orientation, part: 1.0, ..LocalContact::default() };
@@ -184,7 +185,10 @@ mod tests {
                 let cells =
                     CellMemory { state: &mut state, scratch: &mut scratch, footprint: &mut footprint, resolution };
                 let others = OtherContacts::default();
-                response = evaluate(body, tool, &contact, guess, others, &mut weights, cells).expect("an answer");
+                let mut evaluated = LocalResponse::default();
+                evaluate(body, tool, &contact, guess, others, cells, (&mut weights, &mut evaluated))
+                    .expect("an answer");
+                response = evaluated;
                 (contact.foot, contact.penetration) = (response.foot, response.indentation.depth);
             }
             response
