@@ -112,7 +112,7 @@ pub fn estimate(
     let parts = [
         CONSTANT,
         BY_ELEMENTS * indentation.force * material.share / (material.modulus * material.width * depth),
-        by_size(response, around, (free, depth)),
+        by_size(response, &around, (free, depth)),
         local_error(tool, response),
         known * BY_SERIES * 0.01 * fraction.powi(3),
         (1.0 - known) * BY_DEPTH * ((depth + around.by_loads.length()) * inverse_thickness).powi(2),
