@@ -3,6 +3,7 @@
 mod closest;
 mod compliance;
 mod concavities;
+mod convex_corners;
 mod curved;
 mod face;
 pub mod footprint;
@@ -24,6 +25,7 @@ pub(crate) use closest::barycentric;
 pub use closest::{SurfacePoint, SurfaceQuery};
 pub use compliance::{Touch, raise_eigenvalues, smallest_eigenvalue, touch};
 pub use concavities::Concavities;
+pub use convex_corners::CornerSurface;
 pub use local::SeriesFields;
 #[cfg(feature = "offline")]
 pub use patch::wide_patch_weights;

@@ -10,7 +10,7 @@ use super::tool::ToolModel;
 use super::{MAX_BODIES, MAX_TOOLS};
 use crate::contact::footprint::PressedSurface;
 use crate::contact::shape::ToolShape;
-use crate::contact::{CompliantBody, Concavities, RegularCompliance};
+use crate::contact::{CompliantBody, Concavities, CornerSurface, RegularCompliance};
 use crate::memory::Ranges;
 use crate::{Error, Result};
 
@@ -27,6 +27,8 @@ pub struct Model {
     pub(super) regular_compliances: Vec<Vec<Option<Arc<RegularCompliance>>>>,
     /// By tool and body, for such tools that are not spheres: the surface divided into pieces.
     pub(super) pressed_surfaces: Vec<Vec<Option<Arc<PressedSurface>>>>,
+    /// By tool and body, for spheres: the sharp convex corners of the surface, where it has any.
+    pub(super) corner_surfaces: Vec<Vec<Option<Arc<CornerSurface>>>>,
     /// By tool and body, for spheres: where the tool may touch at several places.
     pub(super) concavities: Vec<Vec<Concavities>>,
 }
@@ -42,8 +44,15 @@ impl Model {
             ranges.add(&compliance.fields);
         }
         self.pressed_surfaces.iter().flatten().flatten().for_each(|surface| surface.add_memory(&mut ranges));
+        self.corner_surfaces.iter().flatten().flatten().for_each(|surface| surface.add_memory(&mut ranges));
         self.concavities.iter().flatten().for_each(|concavities| concavities.add_memory(&mut ranges));
         ranges
+    }
+
+    /// Whether any contact may need pressure cells.
+    pub(super) fn needs_cells(&self) -> bool {
+        self.pressed_surfaces.iter().flatten().any(Option::is_some)
+            || self.corner_surfaces.iter().flatten().any(Option::is_some)
     }
 
     /// Prepares bodies and tools.
@@ -100,8 +109,13 @@ impl Model {
             regular_compliances[rank].iter().map(Option::as_deref).zip(&bodies).map(of_body).collect()
         };
         let pressed_surfaces = tools.iter().enumerate().map(pressed_of_tool).collect();
+        let corners_of_tool = |(rank, tool): (usize, &ToolModel)| {
+            let of_body = |(compliance, body)| corner_surface(body, tool, compliance);
+            regular_compliances[rank].iter().map(Option::as_deref).zip(&bodies).map(of_body).collect()
+        };
+        let corner_surfaces = tools.iter().enumerate().map(corners_of_tool).collect();
         let frames = bodies.iter().map(|body| DQuat::from_mat3(&body.placement.rotation.transpose())).collect();
-        Ok(Self { bodies, tools, frames, regular_compliances, pressed_surfaces, concavities })
+        Ok(Self { bodies, tools, frames, regular_compliances, pressed_surfaces, corner_surfaces, concavities })
     }
 
     /// The same model where a body starts with other higher orders of its displacement: see [`BodyModel::with_series`].
@@ -148,6 +162,18 @@ fn pressed_surface(
     }
     let thickness = tool.shape.thickness();
     Some(Arc::new(PressedSurface::new(&body.loaded, &body.query, &local.smooth, &compliance.fields, thickness)))
+}
+
+fn corner_surface(
+    body: &BodyModel,
+    tool: &ToolModel,
+    compliance: Option<&RegularCompliance>,
+) -> Option<Arc<CornerSurface>> {
+    let (local, compliance) = (body.local.as_ref()?, compliance?);
+    let ToolShape::Sphere { radius } = tool.shape else { return None };
+    let (surface, query, smooth) = (&body.loaded, &body.query, &local.smooth);
+    let pressed = || PressedSurface::new(surface, query, smooth, &compliance.fields, radius);
+    CornerSurface::new((surface, query, smooth), radius, pressed).map(Arc::new)
 }
 
 fn regular_compliance(body: &BodyModel, tool: &ToolModel) -> Result<Option<Arc<RegularCompliance>>> {

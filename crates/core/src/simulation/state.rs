@@ -67,7 +67,7 @@ pub struct State {
     pub tools: [ToolState; MAX_TOOLS],
     /// The contacts.
     pub contacts: Contacts,
-    /// Pressures of each contact, for tools without a closed form; empty if there is no such tool.
+    /// Pressures of each contact, for tools and corners without a closed form; empty if there are none.
     pub(super) pressures: Vec<PressureState>,
     /// Static compliance between the contacts in two slots, at the Green's function's own Young's modulus, m/N.
     pub(super) compliance: Box<[[DMat3; MAX_CONTACTS]; MAX_CONTACTS]>,
@@ -95,7 +95,7 @@ impl State {
             bodies: model.bodies.iter().map(body).collect(),
             tools: Default::default(),
             contacts: Contacts::default(),
-            pressures: match model.tools.iter().any(|tool| tool.shape.needs_cells()) {
+            pressures: match model.needs_cells() {
                 true => vec![PressureState::default(); MAX_CONTACTS],
                 false => Vec::new(),
             },

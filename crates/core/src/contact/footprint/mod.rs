@@ -382,7 +382,7 @@ impl NearPiece {
 }
 
 /// Smooth step from zero to one between two bounds, and its slope.
-fn smooth_step(at: f64, [from, to]: [f64; 2]) -> (f64, f64) {
+pub(super) fn smooth_step(at: f64, [from, to]: [f64; 2]) -> (f64, f64) {
     let t = ((at - from) / (to - from)).clamp(0.0, 1.0);
     (t * t * (3.0 - 2.0 * t), 6.0 * t * (1.0 - t) / (to - from))
 }

@@ -124,6 +124,20 @@ impl FanWeights {
         }
     }
 
+    /// Adds other weights that have a share of the whole, with the share's gradient by the tool's place, 1/m.
+    pub fn mix(&mut self, other: &Self, share: f64, gradient: DVec3) {
+        for place in 0..self.count {
+            self.gradients[place] = self.gradients[place] * (1.0 - share) - gradient * self.weights[place];
+            self.turns[place] *= 1.0 - share;
+            self.weights[place] *= 1.0 - share;
+        }
+        for place in 0..other.count {
+            let by_place = other.gradients[place] * share + gradient * other.weights[place];
+            self.add(other.fans[place], share * other.weights[place], [by_place, other.turns[place] * share]);
+        }
+        self.touchable += share * (other.touchable - self.touchable);
+    }
+
     /// Rank of each fan, and the gradient of its weight by the tool's rotation; zero for a sphere.
     pub fn with_turns(&self) -> impl Iterator<Item = (usize, DVec3)> + '_ {
         self.iter().zip(&self.turns).map(|((fan, _), &turn)| (fan, turn))

@@ -11,6 +11,7 @@ use glam::{DMat3, DVec3};
 
 use super::add_contact;
 use super::depth_below;
+use super::near_corner::share_of_contact;
 use super::response::LocalResponse;
 use crate::contact::shape::ToolShape;
 use crate::contact::smooth::FootPoint;
@@ -51,7 +52,7 @@ pub struct SolvedContacts<'a> {
 /// Whether a foot has moved much farther than its tool, or to another side.
 pub fn foot_has_jumped(model: &Model, contact: &Contact, response: &LocalResponse, place: DVec3) -> bool {
     let (local, tool) = (&contact.local, &model.tools[contact.tool]);
-    if local.is_fading || local.is_new || tool.shape.needs_cells() {
+    if local.is_fading || local.is_new || tool.shape.needs_cells() || share_of_contact(model, contact) == 1.0 {
         return false;
     }
     let travel = place.distance(local.relative_position);

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use crate::contact::CornerSurface;
 use crate::contact::footprint::PressedSurface;
 use crate::contact::local::{SeriesFields, StrainTerms, effective_modulus, terms_with_pad};
 use crate::contact::regular::{FanFields, PLANE_STRAIN, POISSON, STRAIN_TERMS, WIDTH};
@@ -19,6 +20,8 @@ pub struct LocalBody<'a> {
     pub series: Option<&'a [SeriesFields]>,
     /// The surface in pieces, for a tool that is not a sphere.
     pub pressed_surface: Option<&'a PressedSurface>,
+    /// Its sharp convex corners, for a sphere.
+    pub corners: Option<&'a CornerSurface>,
     /// Young's modulus over the Green's function's.
     pub scale: f64,
     /// Whether a material at its surface has a law beyond small strain.

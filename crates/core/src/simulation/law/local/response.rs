@@ -77,6 +77,8 @@ pub struct LocalResponse {
     pub higher: HigherOrders,
     higher_at_guess: HigherOrders,
     series: Option<Blended<SERIES_FIELDS>>,
+    /// Part to which these turn the contact (`turned_push`).
+    turned_part: f64,
     /// Part of the place where they are known.
     pub known: f64,
     scale: f64,
@@ -109,32 +111,14 @@ pub struct Guess<'a> {
     pub offset: DVec3,
 }
 
-/// Writes the response to the tool at a position into `response`, without copies of that large struct. `None`, and nothing is
-/// written, where the body is not touchable.
-pub fn evaluate(
-    body: LocalBody<'_>,
-    tool: LocalTool<'_>,
-    contact: &LocalContact,
-    guess: Guess<'_>,
-    others: OtherContacts,
-    cells: CellMemory<'_>,
-    (weights, response): (&mut FanWeights, &mut LocalResponse),
-) -> Option<()> {
-    // Set again with each foot.
-    weights.touchable = 1.0;
-    match body.pressed_surface {
-        Some(pressed) => evaluate_shape((body, pressed), tool, contact, guess, others, cells, (weights, response)),
-        None => evaluate_sphere(body, tool, contact, guess, others, (weights, response)),
-    }
-}
-
 /// A matrix scaled down to a bound of its norm. At an edge the normal of a footprint turns faster than its force does.
-fn bounded(matrix: DMat3, most: f64) -> DMat3 {
+pub(super) fn bounded(matrix: DMat3, most: f64) -> DMat3 {
     let size = matrix.to_cols_array().iter().map(|entry| entry * entry).sum::<f64>().sqrt();
     if size > most { matrix * (most / size) } else { matrix }
 }
 
-fn evaluate_sphere(
+/// The response of a sphere without its force.
+pub(super) fn evaluate_sphere(
     body: LocalBody<'_>,
     tool: LocalTool<'_>,
     contact: &LocalContact,
@@ -174,11 +158,11 @@ fn evaluate_sphere(
         response.slope += higher.slope;
         response.slope_by_force = compliance_slope(body, guess.force, &fields) + higher.slope_by_force;
     }
-    response.find_force(tool, contact, guess.place, others);
     Some(())
 }
 
-fn evaluate_shape(
+/// The response of a tool on pressure cells without its force.
+pub(super) fn evaluate_shape(
     (body, pressed): (LocalBody<'_>, &PressedSurface),
     tool: LocalTool<'_>,
     contact: &LocalContact,
@@ -232,7 +216,6 @@ fn evaluate_shape(
     *response = LocalResponse::at(body, footprint.foot(place), &fields, indentation);
     response.point = place + indentation.lever;
     (response.slope, response.turn) = (slope(body, force, others, &fields), compliance_turns);
-    response.find_force(tool, contact, place, others);
     Some(())
 }
 
@@ -320,6 +303,7 @@ impl LocalResponse {
             offset_by_position: DMat3::ZERO,
             offset_by_force: DMat3::ZERO,
             friction_by_position: DMat3::ZERO,
+            turned_part: 1.0,
             ..Self::default()
         }
     }
@@ -330,24 +314,42 @@ impl LocalResponse {
         self.series.as_ref().map_or_else(HigherOrders::default, at)
     }
 
+    /// Takes the higher orders of the body's displacement with other weights of the fans. The contact is turned by a part only:
+    /// on cells the force follows from the gradient of the energy.
+    pub(super) fn set_series(&mut self, body: LocalBody<'_>, weights: &FanWeights, guess: Guess<'_>, turned_part: f64) {
+        let Some(series) = body.series else { return };
+        self.slope -= self.higher_at_guess.slope;
+        let (blended, known) = blended_series(series, weights);
+        (self.series, self.known, self.turned_part) = (Some(blended), known, turned_part);
+        self.guess = ForceGuess { force: guess.force, friction: guess.friction, offset: guess.offset };
+        self.higher_at_guess = self.higher_orders_at(guess.force);
+        self.slope += self.higher_at_guess.slope;
+        let linear = compliance_slope(body, guess.force, &weights.blend(body.fields));
+        self.slope_by_force = linear + self.higher_at_guess.slope_by_force;
+    }
+
+    /// Slope without the part of the higher orders, N.
+    pub(super) fn linear_slope(&self) -> DVec3 {
+        self.slope - self.higher_at_guess.slope
+    }
+
     /// Finds the wrench that follows from the indentation, inclined by the gradients of the compliance and by the other contacts,
     /// and from friction. It costs little beside the indentation, so that it is found again when the other contacts are known.
     pub fn find_force(&mut self, tool: LocalTool<'_>, contact: &LocalContact, place: DVec3, others: OtherContacts) {
         let indentation = self.indentation;
         let whole = self.slope + others.slope;
         let slope = whole.clamp_length_max(STEEPEST_INCLINATION * indentation.force);
-        let push = match self.series {
-            Some(_) => self.turned_push(whole),
-            None => slope - indentation.gradient,
-        };
+        let part = if self.series.is_some() { self.turned_part } else { 0.0 };
+        let mut push = slope - indentation.gradient;
+        if part > 0.0 {
+            let turned = self.turned_push(whole);
+            push = if part == 1.0 { turned } else { push.lerp(turned, part) };
+        }
         let pressing = push.length();
         if indentation.force == 0.0 || pressing == 0.0 {
             return;
         }
-        let lever = match self.series {
-            Some(_) => push * (-tool.radius / pressing),
-            None => indentation.lever,
-        };
+        let lever = if part > 0.0 { push * (-tool.radius / pressing) } else { indentation.lever };
         let rotation = rotation_vector(contact.previous_orientation, contact.orientation);
         let displacement = place - contact.relative_position + rotation.cross(lever);
         self.normal = push / pressing;
@@ -368,8 +370,9 @@ impl LocalResponse {
         self.friction_by_position =
             self.friction.by_displacement - outer(self.friction.by_pressing, n) * indentation.stiffness;
         self.jacobian = outer(n, n) * indentation.stiffness - turning * indentation.force + self.friction_by_position;
-        if self.series.is_some() {
-            self.jacobian = self.turning * self.jacobian;
+        if part > 0.0 {
+            (self.offset, self.offset_by_force) = (self.offset * part, self.offset_by_force * part);
+            self.jacobian = (DMat3::IDENTITY * (1.0 - part) + self.turning * part) * self.jacobian;
             self.offset_by_position = self.offset_by_force * self.jacobian;
         }
         let share = if whole == DVec3::ZERO { 1.0 } else { slope.length() / whole.length() };
@@ -419,7 +422,7 @@ impl LocalResponse {
 
     /// Derivative of the body's displacement by the position at constant force: the contact moves along the surface.
     pub fn displacement_by_position(&self) -> DMat3 {
-        self.slope_by_force.transpose() * (DMat3::IDENTITY - self.offset_by_position)
+        self.slope_by_force.transpose() * (DMat3::IDENTITY - self.offset_by_position) * self.turned_part
     }
 
     /// The springs of friction; without a force none is stretched.

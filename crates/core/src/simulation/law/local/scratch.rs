@@ -59,6 +59,8 @@ pub struct LocalScratch {
     /// The pieces next to the latest tool, and the slot of its contact.
     pub footprint: FootprintScratch,
     pub pressed_slot: Option<usize>,
+    /// Weights of the share of a sphere's contact that is on cells.
+    pub(super) corner_weights: FanWeights,
     /// Placeholder for contacts without cells.
     pub(super) no_pressures: PressureState,
 }
@@ -116,7 +118,7 @@ impl LocalScratch {
     fn residual(&self, count: usize) -> f64 {
         let of = |a: usize| {
             let moved: DVec3 = (0..count).map(|b| self.between[a][b] * self.responses[b].force).sum();
-            (self.positions[a] - self.free_positions[a] + moved).length()
+            (self.positions[a] - self.free_positions[a] + moved + self.responses[a].higher.displacement).length()
         };
         (0..count)
             .map(of)
@@ -224,6 +226,7 @@ impl LocalScratch {
             cells: Box::default(),
             footprint: FootprintScratch::default(),
             pressed_slot: None,
+            corner_weights: FanWeights::new(neighbourhood(model)),
             no_pressures: PressureState::default(),
         }
     }
@@ -243,6 +246,7 @@ pub fn local_body<'a>(model: &'a Model, bodies: &'a [BodyState], tool: usize, bo
         fields: &regular.fields,
         series: series.map(|series| &series.fields[..]),
         pressed_surface: model.pressed_surfaces[tool][body].as_deref(),
+        corners: model.corner_surfaces[tool][body].as_deref(),
         scale: state.stiffness_scale,
         is_hyperelastic: local.is_hyperelastic,
     })

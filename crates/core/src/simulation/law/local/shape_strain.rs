@@ -1,4 +1,4 @@
-//! Correction for finite strain below an ellipsoid.
+//! Correction for finite strain below an ellipsoid, and below a sphere near a corner.
 //!
 //! Pressure cells give the energy `U` of a linear half-space. A sphere of radius `L` stores `U = 8/15 E* L^3 s^5`, `s = sqrt(d/L)`
 //! (Hertz), and beyond small strain (`contact::local::finite_strain`)
@@ -21,7 +21,7 @@ use crate::math::pow;
 /// Largest `s`: beyond it the factor of the force stays.
 const DEEPEST: f64 = 1.25;
 
-/// The indentation by an ellipsoid with the correction; of another shape as it is. `modulus_by_rotation` is the gradient of `E*`.
+/// The indentation by an ellipsoid or a sphere with the correction; of another shape as it is. `modulus_by_rotation` is the gradient of `E*`.
 pub fn correct_shape(
     linear: Indentation,
     (shape, rotation): (&ToolShape, DMat3),
@@ -29,7 +29,11 @@ pub fn correct_shape(
     footprint: &Footprint,
     modulus_by_rotation: DVec3,
 ) -> Indentation {
-    let ToolShape::Ellipsoid { semi_axes } = *shape else { return linear };
+    let semi_axes = match *shape {
+        ToolShape::Ellipsoid { semi_axes } => semi_axes,
+        ToolShape::Sphere { radius } => DVec3::splat(radius),
+        _ => return linear,
+    };
     let (energy, terms) = (linear.energy, half_space.strain_terms);
     if energy <= 0.0 || terms == [0.0; 3] {
         return linear;

@@ -18,7 +18,8 @@ use super::foot_jumps::{
 };
 use super::force_error::{ForceError, Surroundings, estimate};
 use super::half_space::LocalTool;
-use super::response::{Guess, LocalResponse, OtherContacts, evaluate};
+use super::near_corner::{contact_needs_cells, evaluate};
+use super::response::{Guess, LocalResponse, OtherContacts};
 use super::scratch::{LocalScratch, TrustRegion, local_body};
 use super::wrench::{CellMemory, placed_shape};
 use crate::contact::local::FrictionResponse;
@@ -75,16 +76,11 @@ fn local_tool<'a>(model: &'a Model, controls: &Controls, tool: usize) -> LocalTo
     }
 }
 
-/// Whether the contact in a slot needs pressure cells.
-fn contact_needs_cells(model: &Model, state: &State, slot: usize) -> bool {
-    model.tools[state.contacts.slots[slot].tool].shape.needs_cells()
-}
-
 /// Resolution of cells: the more contacts need them, the coarser, so that a tick stays within its time.
 fn resolution(model: &Model, state: &State) -> Resolution {
     let slots = &state.contacts.slots;
     let local = |slot: usize| slots[slot].mode != Mode::Free && slots[slot].law == LawKind::LOCAL;
-    match (0..MAX_CONTACTS).filter(|&slot| local(slot) && contact_needs_cells(model, state, slot)).count() {
+    match (0..MAX_CONTACTS).filter(|&slot| local(slot) && contact_needs_cells(model, &slots[slot])).count() {
         0 | 1 => Resolution::Fine,
         2..=4 => Resolution::Medium,
         _ => Resolution::Coarse,
@@ -175,7 +171,7 @@ fn solve_equations(
         local.responses[a].friction =
             FrictionResponse { force: contact.local.friction.force(), ..FrictionResponse::default() };
     }
-    let cells = slots.iter().any(|&slot| contact_needs_cells(model, state, slot));
+    let cells = slots.iter().any(|&slot| contact_needs_cells(model, &state.contacts.slots[slot]));
     let (most, [step_factor, force_factor]) =
         if cells { (MOST_CELL_STEPS, CELL_TOLERANCES) } else { (MOST_STEPS, [1.0; 2]) };
     let tool = &model.tools[state.contacts.slots[slots[0]].tool];
@@ -319,16 +315,25 @@ fn evaluate_contacts(
     let mut guessed = [DVec3::ZERO; MAX_CONTACTS];
     for (a, &slot) in slots.iter().enumerate() {
         guessed[a] = local.responses[a].force;
-        if contact_needs_cells(model, state, slot) {
+        if contact_needs_cells(model, &state.contacts.slots[slot]) {
             local.footprint.others = other_planes(&state.contacts, slot);
         }
         let tool = state.contacts.slots[slot].tool;
         let response = local_body(model, &state.bodies, tool, body).and_then(|surface| {
-            let LocalScratch { positions, responses, others, weights, cells, footprint, no_pressures, .. } =
-                &mut *local;
+            let LocalScratch {
+                positions,
+                responses,
+                others,
+                weights,
+                cells,
+                footprint,
+                no_pressures,
+                corner_weights,
+                ..
+            } = &mut *local;
             let contact = &state.contacts.slots[slot].local;
             let pressures = state.pressures.get_mut(slot).unwrap_or(no_pressures);
-            let cells = CellMemory { state: pressures, scratch: cells, footprint, resolution };
+            let cells = CellMemory { state: pressures, scratch: cells, footprint, resolution, corner_weights };
             let tool = local_tool(model, controls, tool);
             let LocalResponse { force, foot, offset, friction, .. } = responses[a];
             let guess = Guess { place: positions[a], force, friction: friction.force, foot: &foot, offset };
@@ -336,7 +341,7 @@ fn evaluate_contacts(
         });
         match response {
             Some(()) => {
-                local.pressed_slot = contact_needs_cells(model, state, slot).then_some(slot);
+                local.pressed_slot = model.tools[tool].shape.needs_cells().then_some(slot);
             }
             None => {
                 if local.weights[a].is_outside() {

@@ -18,6 +18,7 @@ use crate::contact::footprint::{Footprint, FootprintScratch, NearPieces, NearRel
 use crate::contact::local::cells::{CellProblem, CellScratch, PressureState, Resolution};
 use crate::contact::local::{ContactPlane, ToolPose};
 use crate::contact::shape::ToolShape;
+use crate::contact::smooth::FanWeights;
 use crate::simulation::contacts::LocalContact;
 
 /// State and memory of pressure cells, and their resolution.
@@ -27,6 +28,8 @@ pub struct CellMemory<'a> {
     pub scratch: &'a mut CellScratch,
     pub footprint: &'a mut FootprintScratch,
     pub resolution: Resolution,
+    /// Weights of the fans for a share of a sphere's contact.
+    pub corner_weights: &'a mut FanWeights,
 }
 
 /// The shape of a tool as it is pressed: lifted by the approach at which the contact began.
@@ -124,7 +127,8 @@ mod tests {
     use crate::contact::smooth::{DrawnSurface, FanWeights, SmoothSurface};
     use crate::mesh::Surface;
     use crate::simulation::law::local::half_space::LocalBody;
-    use crate::simulation::law::local::response::{Guess, LocalResponse, OtherContacts, evaluate};
+    use crate::simulation::law::local::near_corner::evaluate;
+    use crate::simulation::law::local::response::{Guess, LocalResponse, OtherContacts};
 
     /// A body whose modulus rises by a half over a length of two.
     struct Body {
@@ -159,6 +163,7 @@ mod tests {
                 fields: &self.fields,
                 series: None,
                 pressed_surface: Some(&pressed),
+                corners: None,
                 scale: 1.0,
                 is_hyperelastic: true,
             };
@@ -167,6 +172,7 @@ mod tests {
             let mut weights = FanWeights::new(near(&self.smooth));
             let (mut state, mut scratch) = (PressureState::default(), CellScratch::default());
             let mut footprint = FootprintScratch::default();
+            let mut corner_weights = weights.clone();
             let at = PlacedShape { contact_normal: DVec3::ZERO, ..placed_shape(shape, &contact, place) };
             footprint.near.find(&pressed, &self.query, &at);
             let first = footprint.first_touched(DVec3::ZERO).expect("a piece");
@@ -182,8 +188,13 @@ mod tests {
                     offset: DVec3::ZERO,
                 };
                 let resolution = Resolution::Medium;
-                let cells =
-                    CellMemory { state: &mut state, scratch: &mut scratch, footprint: &mut footprint, resolution };
+                let cells = CellMemory {
+                    state: &mut state,
+                    scratch: &mut scratch,
+                    footprint: &mut footprint,
+                    resolution,
+                    corner_weights: &mut corner_weights,
+                };
                 let others = OtherContacts::default();
                 let mut evaluated = LocalResponse::default();
                 evaluate(body, tool, &contact, guess, others, cells, (&mut weights, &mut evaluated))

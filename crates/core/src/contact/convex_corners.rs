@@ -1,0 +1,150 @@
+//! Sharp convex corners of a surface, near which a sphere has no closed form.
+//!
+//! Under a sphere on a corner three quarters of the half-space are missing, and what is left is softer: Sneddon's force is three
+//! to twelve times too large. There its pressure is computed on cells, as that of other tools. With the distance `q` of the
+//! sphere's centre from the nearest corner, over its radius, the share of cells goes from one to zero. It is a function of the
+//! sphere's position over the surface at rest alone, so the mean of both energies with this weight is again one energy.
+//!
+//! Along edges between corners a sphere has the closed form: cells that pass over an edge give energies whose differences are
+//! forces to 15 % only, so that closed paths over a thin rim would gain energy.
+
+use std::collections::BTreeSet;
+
+use glam::DVec3;
+
+use super::SurfaceQuery;
+use super::footprint::{PressedSurface, smooth_step};
+use super::smooth::SmoothSurface;
+use crate::memory::Ranges;
+use crate::mesh::Surface;
+
+/// Distances of the sphere's centre from a corner, over its radius, up to which its contact is all on cells, and from which it has
+/// none.
+const NEAR: [f64; 2] = [1.2, 2.2];
+/// Corners up to this distance from a triangle, over the radius, are listed for it: the sphere's centre may lie as deep below the
+/// triangle as it is far from the corner.
+const LISTED: f64 = 2.0 * NEAR[1];
+/// Least number of convex creases that meet in a corner.
+const LEAST_CREASES: usize = 3;
+
+/// A surface with sharp convex corners, for a sphere.
+pub struct CornerSurface {
+    /// The surface in pieces.
+    pub pressed: PressedSurface,
+    /// Positions of the corners, m.
+    corners: Vec<DVec3>,
+    /// For each drawn triangle the start of its corners in `near`; one more for the end.
+    offsets: Vec<u32>,
+    near: Vec<u32>,
+    radius: f64,
+}
+
+impl CornerSurface {
+    /// For a sphere of `radius`, m; `None` for a surface without such corners. `pressed` makes its pieces.
+    pub fn new(
+        (surface, query, smooth): (&Surface, &SurfaceQuery, &SmoothSurface),
+        radius: f64,
+        pressed: impl FnOnce() -> PressedSurface,
+    ) -> Option<Self> {
+        let corners = convex_corners(surface, smooth);
+        if corners.is_empty() {
+            return None;
+        }
+        let mut lists = vec![BTreeSet::new(); surface.triangles.len()];
+        let reach = DVec3::splat(LISTED * radius);
+        for (rank, &corner) in corners.iter().enumerate() {
+            query.for_each_within(corner - reach, corner + reach, |triangle| {
+                lists[triangle as usize].insert(rank as u32);
+            });
+        }
+        let mut offsets = vec![0];
+        let mut near = Vec::new();
+        for list in lists {
+            near.extend(list);
+            offsets.push(near.len() as u32);
+        }
+        Some(Self { pressed: pressed(), corners, offsets, near, radius })
+    }
+
+    /// Share of cells in the contact of a sphere at a position near a triangle, and its gradient, 1/m.
+    pub fn share(&self, triangle: u32, position: DVec3) -> (f64, DVec3) {
+        let [from, to] = [0, 1].map(|next| self.offsets[triangle as usize + next] as usize);
+        let offsets = self.near[from..to].iter().map(|&corner| position - self.corners[corner as usize]);
+        let Some(nearest) = offsets.min_by(|a, b| a.length_squared().total_cmp(&b.length_squared())) else {
+            return (0.0, DVec3::ZERO);
+        };
+        let distance = nearest.length();
+        let (beyond, slope) = smooth_step(distance / self.radius, NEAR);
+        (1.0 - beyond, nearest * (-slope / (self.radius * distance.max(f64::MIN_POSITIVE))))
+    }
+
+    /// Adds the memory that a tick reads.
+    pub(crate) fn add_memory(&self, ranges: &mut Ranges) {
+        self.pressed.add_memory(ranges);
+        ranges.add(&self.corners);
+        ranges.add(&self.offsets);
+        ranges.add(&self.near);
+    }
+}
+
+/// Positions of the nodes in which several creases meet whose faces turn away from each other, m.
+fn convex_corners(surface: &Surface, smooth: &SmoothSurface) -> Vec<DVec3> {
+    let mut counts = vec![0; surface.positions.len()];
+    for (t, across) in surface.neighbours.iter().enumerate() {
+        let (ends, nodes) = (surface.corners(t as u32), surface.triangles[t]);
+        let creases = smooth.creases_of(t as u32);
+        for k in (0..3).filter(|&k| creases[k] && across[k] != u32::MAX && across[k] as usize > t) {
+            let next = (k + 1) % 3;
+            let [first, second] = [t, across[k] as usize].map(|t| surface.normals[t]);
+            if first.cross(second).dot(ends[next] - ends[k]) > 0.0 {
+                counts[nodes[k] as usize] += 1;
+                counts[nodes[next] as usize] += 1;
+            }
+        }
+    }
+    surface.positions.iter().zip(counts).filter(|&(_, count)| count >= LEAST_CREASES).map(|(&at, _)| at).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::smooth::tests::{ball, cube};
+
+    fn of(surface: &Surface, radius: f64) -> Option<CornerSurface> {
+        let query = SurfaceQuery::new(surface).expect("triangles");
+        let smooth = SmoothSurface::new(surface);
+        let fields = vec![Default::default(); smooth.fans().len()];
+        CornerSurface::new((surface, &query, &smooth), radius, || {
+            PressedSurface::new(surface, &query, &smooth, &fields, radius)
+        })
+    }
+
+    #[test]
+    fn a_ball_has_no_corners_and_a_cube_has_eight() {
+        assert!(of(&ball(24), 0.1).is_none());
+        assert_eq!(of(&cube(), 0.1).expect("corners").corners.len(), 8);
+    }
+
+    #[test]
+    fn the_share_is_one_on_a_corner_and_falls_off_beside_it_with_its_gradient() {
+        let (surface, radius) = (cube(), 0.1);
+        let corners = of(&surface, radius).expect("corners");
+        let query = SurfaceQuery::new(&surface).expect("triangles");
+        let share = |x: f64| {
+            let position = DVec3::new(x, 1.0, 1.0 + 0.9 * radius);
+            let triangle = query.closest(&surface, position).expect("a point").triangle;
+            corners.share(triangle, position)
+        };
+        assert_eq!(share(1.0), (1.0, DVec3::ZERO));
+        assert_eq!(share(0.5), (0.0, DVec3::ZERO));
+        let mut before = 0.0;
+        for k in 0..60 {
+            let x = 0.75 + 0.004 * f64::from(k);
+            let (part, slope) = share(x);
+            let difference = (share(x + 1e-7).0 - share(x - 1e-7).0) / 2e-7;
+            assert!((slope.x - difference).abs() < 1e-5 / radius, "{x} {slope} {difference}");
+            assert!(part >= before, "{x}");
+            before = part;
+        }
+    }
+}
