@@ -84,11 +84,16 @@ def _middle(mesh: palpate.TetMesh) -> int:
 
 
 def _spacing(mesh: palpate.TetMesh) -> float:
-    """Mean length of the edges around the middle, each of which a node halves."""
+    """Mean spacing of nodes around the middle as the contact law takes it: of the mean edge at each node around."""
     faces = np.asarray(mesh.surface_faces)
-    near = faces[np.linalg.norm(mesh.nodes[faces].mean(axis=1) - mesh.nodes[_middle(mesh)], axis=1) < 0.02]
-    corners = mesh.nodes[near[:, :3]]
-    return float(0.5 * np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean())
+    parts = np.concatenate([faces[:, k] for k in ([0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5])])
+    around = np.unique(parts[(parts == _middle(mesh)).any(axis=1)])
+    return float(np.mean([_mean_edge(mesh, parts, node) for node in around]))
+
+
+def _mean_edge(mesh: palpate.TetMesh, parts: np.ndarray, node: int) -> float:
+    others = parts[(parts == node).any(axis=1)]
+    return float(np.linalg.norm(mesh.nodes[others[others != node]] - mesh.nodes[node], axis=1).mean())
 
 
 def _cubes() -> palpate.TetMesh:

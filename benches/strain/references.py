@@ -20,7 +20,7 @@ RADIUS, MODULUS = 0.01, 10e3
 # Sizes of elements below the sphere over its radius: with the first, Newton's method does not find the contact of one
 # body at all, and sizes around it give forces that differ by 0.2 %. Growth outwards, longest step over the radius.
 FINE, GROWTH, STEP = (1 / 9, 1 / 10), 1.4, 0.12
-SEED, DRAWN, PRESSES = 20240611, 25, 8
+SEEDS, DRAWN, PRESSES = (20240611, 20261126), 25, 8
 # Largest depth of bodies drawn by chance: over the height, over that of a plate, and in m.
 MOST, MOST_OF_PLATE, DEEPEST = 0.4, 1.2, 0.015
 OUT = Path(__file__).parents[2] / "tests/data/large_strain.json"
@@ -51,8 +51,10 @@ def cases() -> list[dict]:
     for t in (0.01, 0.015):
         found.append(_case(f"layer {t}", (0.06, t), 0.45, "bonded", np.array([0.1, 0.2, 0.3, 0.4]) * t))
     found.append(_case("plate", (0.05, 0.01), 0.45, "rim", [0.0025, 0.005, 0.01, 0.015]))
-    rng = np.random.default_rng(SEED)
-    return found + [_drawn(rng, f"random {k}") for k in range(DRAWN)]
+    for first, seed in enumerate(SEEDS):
+        rng = np.random.default_rng(seed)
+        found += [_drawn(rng, f"random {first * DRAWN + k}") for k in range(DRAWN)]
+    return found
 
 
 def _drawn(rng: np.random.Generator, name: str) -> dict:

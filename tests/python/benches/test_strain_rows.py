@@ -35,3 +35,10 @@ def test_programs_that_take_no_part_are_named(monkeypatch):
         "Drake is left out: not installed (pip install drake)",
         "SOFA is left out: PyPI has no wheel of it",
     ]
+
+
+def test_the_bodies_of_cuboids_have_a_full_solution_at_every_depth():
+    stored = bodies._stored()
+    for case in bodies.cuboids():
+        assert stored[case.name]["depths"] == case.depths.tolist()
+        assert len(stored[case.name]["forces"]) == len(case.depths), case.name

@@ -60,9 +60,11 @@ def test_a_force_five_per_cent_off_is_not_that_of_the_shape(make):
     body, shape, depth = body_on_table(shapes.BLOCK, (10, 10, 5), quadratic=True), make(), 5e-4
     forces = shapes.pressed(body, shape, np.linspace(1e-4, depth, 5))
     truth = shapes.direct(shapes.BLOCK, shape, depth)
-    assert abs(forces[-1] / truth - 1) <= shapes.TOLERANCE
+    # Closer than all shapes of the table have to be.
+    tolerance = 0.75 * shapes.TOLERANCE
+    assert abs(forces[-1] / truth - 1) <= tolerance
     for wrong in (1.05 * forces, -forces, stale(forces)):
-        assert abs(wrong[-1] / truth - 1) > shapes.TOLERANCE
+        assert abs(wrong[-1] / truth - 1) > tolerance
 
 
 @pytest.mark.slow

@@ -9,7 +9,7 @@ from benches.strain.cylinders import RADIUS, references
 from palpate.simulation import Simulation
 
 # Largest error of a force, to 30 % of the height, on elements of 12 mm.
-ALLOWED = 0.05
+ALLOWED = 0.025
 BODIES = {cylinder.name: cylinder for cylinder in references()}
 
 
@@ -28,15 +28,21 @@ def test_forces_are_those_of_a_full_solution_within_the_stated_error(name, tmp_p
     assert errors.max() < ALLOWED
     assert (errors < stated).all()
     # It says something.
-    assert stated.max() < (0.07 if name.startswith("block") else 0.15)
+    assert stated.max() < 0.09
+    # And sees an error of the force.
+    for factor in (0.95, 1.05):
+        assert np.abs(factor * forces / body.forces - 1.0).max() > ALLOWED
 
 
 @pytest.mark.parametrize("nu", [0.3, 0.45, 0.49])
 def test_a_column_has_the_force_of_a_full_solution(nu, tmp_path):
     """A patch of three radii, which its sides cut off, would be 4 to 14 % off."""
     (column,) = (body for body in references(0.006) if body.name == f"column {nu}")
-    forces, _ = column.pressed(tmp_path)
-    assert np.abs(forces / column.forces - 1.0).max() < 0.02
+    forces, stated = column.pressed(tmp_path)
+    errors = np.abs(forces / column.forces - 1.0)
+    assert errors.max() < 0.02
+    assert (errors < stated).all()
+    assert stated.max() < 0.065
 
 
 def test_a_plate_that_hardens_is_followed_to_one_and_a_half_thicknesses(tmp_path):
@@ -44,9 +50,10 @@ def test_a_plate_that_hardens_is_followed_to_one_and_a_half_thicknesses(tmp_path
     (plate,) = (body for body in references(0.006) if body.name == "plate")
     forces, stated = plate.pressed(tmp_path)
     errors = np.abs(forces / plate.forces - 1.0)
-    assert errors.max() < 0.09
-    assert errors[2:].max() < 0.05
+    assert errors[:3].max() < 0.04
+    assert errors.max() < 0.075
     assert (errors < stated).all()
+    assert stated.max() < 0.16
 
 
 @pytest.mark.parametrize("thickness", ["0.01", "0.015"])
@@ -56,7 +63,7 @@ def test_a_glued_layer_has_the_force_of_a_full_solution(thickness, tmp_path):
     forces, stated = layer.pressed(tmp_path)
     errors = np.abs(forces / layer.forces - 1.0)
     # To 30 % of the thickness.
-    assert errors[:3].max() < 0.06
+    assert errors[:3].max() < (0.05 if thickness == "0.01" else 0.02)
     assert (errors < stated).all()
 
 
@@ -75,18 +82,18 @@ def test_a_round_ellipsoid_has_the_force_and_the_work_of_a_sphere(tmp_path):
     forces = -recording.forces
     work = np.cumsum((0.5 * (forces[1:] + forces[:-1]) * np.diff(path, axis=0)).sum(axis=1))
     assert abs(work[-1]) < 2e-3 * work.max()
-    assert 0.01 < contacts["error"].max() < 0.12
+    assert 0.01 < contacts["error"].max() < 0.13
 
 
 @pytest.mark.slow
-def test_the_stated_error_covers_the_true_one_in_most_of_200_presses(tmp_path):
+def test_the_stated_error_covers_the_true_one_in_most_of_400_presses(tmp_path):
     covered, stated_errors = [], []
     for body in BODIES.values():
         if body.name.startswith("random"):
             forces, stated = body.pressed(tmp_path)
             covered += (np.abs(forces / body.forces - 1.0) <= stated).tolist()
             stated_errors += stated.tolist()
-    assert len(covered) > 190
+    assert len(covered) > 380
     assert np.mean(covered) >= 0.95
     # It says something: the bodies are small beside the elements, and the bound is not.
-    assert np.median(stated_errors) < 0.15
+    assert np.median(stated_errors) < 0.08

@@ -6,8 +6,10 @@
 //! |---|---|
 //! | fit of the half-space's table | constant |
 //! | elements: the compliance of the half-space that is subtracted for a patch of radius `b` | its part of the depth |
-//! | narrow body: a patch of radius `b` in it is no half-space | cube of `b` over the breadth of the body |
-//! | thin body that is free below: a plate bends less under a patch than under a contact | square of `b` over the thickness |
+//! | narrow body: a patch of radius `b` reaches its sides | sixth power of `b` over the breadth, less in a thin body |
+//! | thin body on a support, pressed deep: it is squeezed out from below the contact | `b/t` times the depth over the thickness `t` |
+//! | thin body that is free below: a plate bends less under a patch than under a contact, and its elements bend less | `b/t` |
+//! | material that stiffens: the series leaves out its higher orders | the sphere's correction, times `b` over thickness or breadth |
 //! | half-space beyond the table's Poisson's ratios | distance from it, times `s = sqrt(d/R)` |
 //! | a tool that is not a sphere, or a pad: linear there | the sphere's correction at the same mean pressure |
 //! | body with a series | what the series leaves out, `|U_5| / U_2` |
@@ -20,6 +22,7 @@
 
 use glam::DVec3;
 
+use super::half_space::LocalMaterial;
 use super::response::LocalResponse;
 use crate::contact::local::{DEEPEST_FIT, STRAIN_RATIOS};
 use crate::contact::shape::ToolShape;
@@ -29,16 +32,23 @@ use crate::simulation::tool::ToolModel;
 
 /// Error of the table.
 const CONSTANT: f64 = 0.01;
-/// Error of the elements, over the displacement of a half-space under the same patch `0.77 F/(E* b)`, over the depth.
-const BY_ELEMENTS: f64 = 0.04;
-/// Factors of the cube of `b` over the breadth: for a body whose support stiffens the contact, and added to it for one that is free
-/// below. They differ in the part of the depth by which the body yields, which is negative above a support.
-const BY_BREADTH: [f64; 2] = [0.3, 0.45];
+/// Error of the elements over `F/(E* b)`, over the depth: a third of what 10-node elements lack (`contact::regular`).
+const BY_ELEMENTS: f64 = 0.02;
+/// Factors of `b` over the breadth: of its cube for a body whose support stiffens the contact, of its sixth power for one that is free
+/// below, and the most that the latter counts. They differ in the part of the depth by which the body yields, which is negative above
+/// a support. Forces on the narrowest columns measured, five elements wide, were 19 % off.
+const BY_BREADTH: [f64; 2] = [0.22, 3.7];
+const MOST_BREADTH: f64 = 0.08;
 const SUPPORTED: f64 = -0.15;
-/// Most that this part states: forces on the narrowest columns measured were 10 % off.
-const MOST_BY_BREADTH: f64 = 0.14;
-/// Factor of the square of `b` over the thickness, at most 1, of a body that is free below: plates that are held at their rim.
-const BY_BENDING: f64 = 0.15;
+/// Error of a plate that is held at its rim, the part of it that goes with `1/(1 - 2 nu)`, and the largest of these that counts. A body
+/// becomes a plate between these `b/t`; from `b = t` on, where one or two elements fill its thickness, it grows as `(b/t)^1.5`.
+const BY_BENDING: [f64; 2] = [0.1, 0.0014];
+const MOST_INCOMPRESSIBLE: f64 = 50.0;
+const PLATE: [f64; 2] = [0.3, 0.7];
+/// Factor of `b/t`, at most 1, times the depth over the thickness of a body on a support.
+const BY_SQUEEZING: f64 = 0.12;
+/// Error over the correction of a sphere of a material that stiffens.
+const BY_STIFFENING: f64 = 0.55;
 /// Change of the force with Poisson's ratio over `s`.
 const BY_POISSON: f64 = 0.8;
 /// Error of the force under other shapes over the correction of a sphere: without a correction, and with that of an ellipsoid.
@@ -102,9 +112,7 @@ pub fn estimate(
     let parts = [
         CONSTANT,
         BY_ELEMENTS * indentation.force * material.share / (material.modulus * material.width * depth),
-        ((BY_BREADTH[0] + BY_BREADTH[1] * free) * (material.width * around.inverse_breadth).powi(3))
-            .min(MOST_BY_BREADTH),
-        BY_BENDING * free * (material.width * inverse_thickness).min(1.0).powi(2),
+        by_size(response, &around, (free, depth)),
         local_error(tool, response),
         known * BY_SERIES * 0.01 * fraction.powi(3),
         (1.0 - known) * BY_DEPTH * ((depth + around.by_loads.length()) * inverse_thickness).powi(2),
@@ -121,14 +129,34 @@ pub fn estimate(
     ForceError { relative: parts.iter().sum::<f64>() + (1.0 - held), held }
 }
 
+/// Error by the thickness and the breadth of the body; `free` is zero above a support and one for a plate or a column.
+fn by_size(response: &LocalResponse, around: &Surroundings, (free, depth): (f64, f64)) -> f64 {
+    let indentation = &response.indentation;
+    let material = &indentation.material;
+    let [wide, broad] = [around.inverse_thickness, around.inverse_breadth].map(|inverse| material.width * inverse);
+    let (thin, cube) = (wide.min(1.0), broad.powi(3));
+    let coarse = wide.max(1.0);
+    let plate = ((wide - PLATE[0]) / (PLATE[1] - PLATE[0])).clamp(0.0, 1.0) * coarse * coarse.sqrt();
+    let volumetric = (1.0 / (1.0 - 2.0 * material.poisson)).min(MOST_INCOMPRESSIBLE);
+    let column = BY_BREADTH[1] * (cube * cube).min(MOST_BREADTH) * (1.0 - thin);
+    let s = (indentation.depth / indentation.effective_radius).clamp(0.0, DEEPEST * DEEPEST).sqrt();
+    let stiffening = (material.share * correction(material, s)).max(0.0);
+    (1.0 - free) * (BY_BREADTH[0] * cube.min(1.0) + BY_SQUEEZING * thin * depth * around.inverse_thickness)
+        + free * (column + plate * BY_BENDING[1].mul_add(volumetric, BY_BENDING[0]))
+        + BY_STIFFENING * stiffening * wide.max(broad).min(1.0)
+}
+
+/// Relative change of a sphere's force by finite strain at `s = sqrt(d/R)`.
+fn correction(material: &LocalMaterial, s: f64) -> f64 {
+    let [first, second, third] = material.strain_terms;
+    s * (first + s * (second + s * third))
+}
+
 /// Error of the half-space.
 fn local_error(tool: &ToolModel, response: &LocalResponse) -> f64 {
     let indentation = &response.indentation;
     let material = &indentation.material;
-    let correction = |s: f64| {
-        let [first, second, third] = material.strain_terms;
-        (s * (first + s * (second + s * third))).abs()
-    };
+    let correction = |s: f64| correction(material, s).abs();
     if tool.shape.needs_cells() {
         // For Hertz's sphere s = a/R = 3 F / (4 E* a^2).
         let pressure = indentation.force / (material.modulus * indentation.radius.powi(2)).max(f64::MIN_POSITIVE);
