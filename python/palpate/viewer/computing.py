@@ -96,7 +96,8 @@ class Computing:
 
 def _series_entry(session: Session) -> dict[str, Any] | None:
     """How far the series beyond small strain are; None where nothing is computed of them."""
-    background = session.simulation.series
+    simulation = getattr(session, "simulation", None)  # none runs where a body is set up
+    background = None if simulation is None else simulation.series
     if background is None or background.is_complete:
         return None
     left = background.seconds_left

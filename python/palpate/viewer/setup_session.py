@@ -38,7 +38,7 @@ class SetupSession:
 
     def __init__(self, body: SetupBody | None = None):
         self.body = body
-        self.built, self.simulation = SimpleNamespace(bodies=()), SimpleNamespace(series=None)
+        self.built = SimpleNamespace(bodies=())
         self.recorder = SimpleNamespace(stop=lambda _reason=None: None, stop_after_failure=lambda: None)
 
     def start(self) -> None:

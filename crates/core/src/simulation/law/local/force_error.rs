@@ -20,10 +20,9 @@
 //! A rigid punch that sticks is pushed back by `(1 - nu) ln(3 - 4 nu) / (1 - 2 nu)` times the force of a smooth one (Mossakovskii,
 //! 1963; Spence, 1968).
 
-use glam::DVec3;
-
 use super::half_space::LocalMaterial;
 use super::response::LocalResponse;
+use super::surroundings::Surroundings;
 use crate::contact::local::{DEEPEST_FIT, STRAIN_RATIOS};
 use crate::contact::shape::ToolShape;
 use crate::math::log;
@@ -32,8 +31,10 @@ use crate::simulation::tool::ToolModel;
 
 /// Error of the table.
 const CONSTANT: f64 = 0.01;
-/// Error of the elements over `F/(E* b)`, over the depth: a third of what 10-node elements lack (`contact::regular`).
+/// Error of the elements over `F/(E* b)`, over the depth: a third of what 10-node elements lack (`contact::regular`), and that of
+/// 4-node elements, from whose compliance nothing is taken off.
 const BY_ELEMENTS: f64 = 0.02;
+const BY_LINEAR_ELEMENTS: f64 = 0.04;
 /// Factors of `b` over the breadth: of its cube for a body whose support stiffens the contact, of its sixth power for one that is free
 /// below, and the most that the latter counts. They differ in the part of the depth by which the body yields, which is negative above
 /// a support. Forces on the narrowest columns measured, five elements wide, were 19 % off.
@@ -70,20 +71,6 @@ const MOST_THICKNESS: f64 = 0.75;
 /// Force over that at which the series ends up to which it counts: `|U_5| / U_2` of 2 %.
 const SERIES_REACH: f64 = 1.26;
 
-/// What else acts at a contact.
-#[derive(Clone, Copy, Debug)]
-pub struct Surroundings {
-    /// One over the thickness of the body below, 1/m.
-    pub inverse_thickness: f64,
-    /// One over its breadth there, the distance through it along lines inclined by 60 degrees, 1/m.
-    pub inverse_breadth: f64,
-    /// Displacement by the other contacts and by loads, m.
-    pub by_others: DVec3,
-    pub by_loads: DVec3,
-    /// Coefficient of friction.
-    pub friction: f64,
-}
-
 /// Relative error of a force, and the share of it that is within the range of the law.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ForceError {
@@ -108,10 +95,11 @@ pub fn estimate(
     let (known, fraction) = (response.known, response.higher.fraction.max(0.0));
     // Above a support the approach of the half-space is larger than the tool's.
     let depth = if contact.depth > 0.0 { contact.depth } else { indentation.depth };
+    let by_elements = if around.has_linear_elements { BY_LINEAR_ELEMENTS } else { BY_ELEMENTS };
     let free = ((1.0 - indentation.depth / depth - SUPPORTED) / -SUPPORTED).clamp(0.0, 1.0);
     let parts = [
         CONSTANT,
-        BY_ELEMENTS * indentation.force * material.share / (material.modulus * material.width * depth),
+        by_elements * indentation.force * material.share / (material.modulus * material.width * depth),
         by_size(response, &around, (free, depth)),
         local_error(tool, response),
         known * BY_SERIES * 0.01 * fraction.powi(3),

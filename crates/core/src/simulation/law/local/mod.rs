@@ -29,6 +29,7 @@ mod response;
 mod scratch;
 mod shape_strain;
 mod solve;
+mod surroundings;
 mod wrench;
 
 pub use scratch::LocalScratch;

@@ -16,11 +16,12 @@ use super::foot_jumps::{
     SolvedContacts, contact_depth, continue_contact, fade_lost_contacts, fade_merged_contacts, foot_has_jumped,
     replace_jumped_contacts, update_parts,
 };
-use super::force_error::{ForceError, Surroundings, estimate};
+use super::force_error::{ForceError, estimate};
 use super::half_space::LocalTool;
 use super::near_corner::{contact_needs_cells, evaluate};
 use super::response::{Guess, LocalResponse, OtherContacts};
 use super::scratch::{LocalScratch, TrustRegion, local_body};
+use super::surroundings::surroundings;
 use super::wrench::{CellMemory, placed_shape};
 use crate::contact::local::FrictionResponse;
 use crate::contact::local::cells::Resolution;
@@ -464,33 +465,4 @@ fn store_results(
     }
     update_parts(state, &local.responses, slots);
     fade_merged_contacts(model, state, slots);
-}
-
-/// What else acts at one of the contacts of a body.
-fn surroundings(
-    model: &Model,
-    state: &State,
-    local: &LocalScratch,
-    (slots, a): (&[usize], usize),
-    body: usize,
-    controls: &Controls,
-) -> Surroundings {
-    let slot = slots[a];
-    let [inverse_thickness, inverse_breadth] =
-        local.weights[a].iter().fold([0.0; 2], |[thickness, breadth], (fan, weight)| {
-            let own = model.bodies[body].local.as_ref().map_or([0.0; 2], |own| own.inverse_sizes[fan]);
-            [thickness + weight * own[0], breadth + weight * own[1]]
-        });
-    let others = (0..slots.len()).filter(|&b| b != a);
-    let by_others: DVec3 = others.map(|b| local.between[a][b] * local.responses[b].force).sum();
-    let by_linear = local.free_positions[a].distance(state.contacts.slots[slot].local.tool_position);
-    let by_loads = local.weights[a].iter().map(|(fan, weight)| load_displacement(model, body, fan) * weight).sum();
-    let friction = controls.friction[state.contacts.slots[slot].tool];
-    Surroundings { inverse_thickness, inverse_breadth, by_others: by_others + DVec3::X * by_linear, by_loads, friction }
-}
-
-/// Displacement of the surface at a fan by the loads of a body, m.
-fn load_displacement(model: &Model, body: usize, fan: usize) -> DVec3 {
-    let fixed = &model.bodies[body];
-    fixed.load_displacement(fixed.local.as_ref().map_or(0, |own| own.smooth.fans()[fan].node as usize))
 }
