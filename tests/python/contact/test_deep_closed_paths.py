@@ -26,8 +26,8 @@ CLEAR = 1e-3
 # A tool deeper than about its radius snaps off, a sphere always.
 LOST = {
     "sphere": (0.86, 0.82, 0.80, 0.78, 0.76, 0.75),
-    "ellipsoid": (0.01, 0.08, 0.10, 0.40, 0.70, 0.92),
-    "capsule": (0.01, 0.13, 0.58, 0.60, 0.46, 0.60),
+    "ellipsoid": (0.01, 0.29, 0.22, 0.45, 0.82, 0.99),
+    "capsule": (0.01, 0.13, 0.58, 0.60, 0.61, 0.60),
 }
 
 

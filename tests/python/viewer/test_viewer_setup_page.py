@@ -64,7 +64,8 @@ def paint_front(page) -> None:
 
 
 def pressed(page) -> tuple[np.ndarray, float]:
-    """Force of a press at the middle of the top, and its depth."""
+    """Force of a press at the middle of the top, and its depth, once the series beyond small strain is there."""
+    page.get_by_test_id("series-note").wait_for(state="hidden")
     press(page, 3, place=page.evaluate("p => window.palpate.project(p)", [0.0, 0.008, 5e-4 * SIDES[2]]))
     force = settled_force(page)
     depth = state(page)["depth"]
