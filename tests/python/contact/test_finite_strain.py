@@ -39,7 +39,7 @@ def test_a_neo_hookean_block_has_the_force_of_a_full_solution(ratio):
 @pytest.mark.slow
 def test_the_linear_law_fails_the_same_bound():
     errors = np.abs(forces_on(palpate.Material(10e3, 0.45)) / FORCES[0.45] - 1.0)
-    assert errors[2] > 1.5 * ALLOWED
+    assert errors[2] > 1.4 * ALLOWED
     assert errors[3] > 2.5 * ALLOWED
 
 
