@@ -138,5 +138,5 @@ def test_over_a_nodule_the_map_is_that_of_the_direct_solution(tmp_path):
     (forces,) = ball.pressed(benchmark.TOOL, depths, benchmark.SOFT, [benchmark.MODULUS])
     force, slope = benchmark.smooth_at(depths, forces, depth)
     print(f"F {found.force} N, direct {force:g}; dF/dd {found.stiffness} N/m, direct {slope:g}")
-    assert found.force[0] == pytest.approx(force, rel=0.02)
+    assert found.force[0] == pytest.approx(force, rel=0.03)
     assert found.stiffness[0] == pytest.approx(slope, rel=0.03)
