@@ -28,9 +28,11 @@ const SHARE_GROWTH: f64 = 1.05;
 const LEAST_SHARE: f64 = 1e-3;
 /// Growth in a tick of the bound of a contact with a prepared response.
 const BOUND_GROWTH: f64 = 1.3;
-/// Distance of sliding after which strain is requested again, over the mean length of edges: for a contact within the limit, and
-/// for one at it. The strain per newton of a sliding contact changes by a third from node to node and back.
+/// Distance of sliding after which strain is requested again, over the mean length of edges: for a contact far within the limit, and
+/// for one near it, whose force would pass it if it were `NEAR` times as large. The strain per newton of a sliding contact changes by
+/// a third from node to node and back.
 const NEW_REQUEST: [f64; 2] = [1.0, 0.1];
+const NEAR: f64 = 1.5;
 
 /// Bounds the displacement of the new contact in `slot`. A nonlinear one is bounded later, when its nodes are known.
 pub(super) fn begin(model: &Model, state: &mut State, slot: usize, limit: f64) {
@@ -62,7 +64,7 @@ fn provisional_bound(model: &Model, state: &State, slot: usize, limit: f64) -> f
 /// would release more energy than was put in (5 % of the peak on a block). The difference is balanced at the device's port, as
 /// that of ramp and slew limit is: the forces before the reduction follow from one energy.
 pub(super) fn limit_sliding_forces(model: &Model, state: &mut State, body: usize, limit: f64) {
-    let share = share_within(state, body, limit);
+    let (share, near) = share_within(state, body, limit);
     for slot in state.contacts.occupied() {
         let contact = &state.contacts.slots[slot];
         if contact.body != body || !contact.nonlinear {
@@ -86,15 +88,16 @@ pub(super) fn limit_sliding_forces(model: &Model, state: &mut State, body: usize
         contact.limited = own < 1.0;
         contact.force *= own;
         contact.torque *= own;
-        contact.request_strain_after(NEW_REQUEST[usize::from(contact.limited)] * model.bodies[body].mean_edge);
+        let distance = NEW_REQUEST[usize::from(contact.limited || near)] * model.bodies[body].mean_edge;
+        contact.request_strain_after(distance);
     }
 }
 
-/// Share of these forces that is within the limit.
-fn share_within(state: &mut State, body: usize, limit: f64) -> f64 {
+/// Share of these forces that is within the limit, and whether they are near it.
+fn share_within(state: &mut State, body: usize, limit: f64) -> (f64, bool) {
     let State { bodies, contacts, .. } = state;
     let BodyState { strain, limit_share, stiffness_scale, .. } = &mut bodies[body];
-    let Some(watch) = strain.as_deref().filter(|_| limit > 0.0) else { return 1.0 };
+    let Some(watch) = strain.as_deref().filter(|_| limit > 0.0) else { return (1.0, false) };
     let mut forces = [DVec3::ZERO; MAX_CONTACTS_WATCHED];
     let mut covered = contacts.on(body).filter_map(|slot| {
         let contact = &contacts.slots[slot];
@@ -105,11 +108,12 @@ fn share_within(state: &mut State, body: usize, limit: f64) -> f64 {
     let (first, second) = (covered.next(), covered.next());
     covered.for_each(drop);
     let share = watch.response.share(&forces, limit);
+    let near = share < 1.0 || watch.response.share(&forces.map(|force| force * NEAR), limit) < 1.0;
     // With several contacts it is unknown which of them changes the share.
     let path = first
         .filter(|_| second.is_none())
         .map(|(contact, serial)| (contact.strain_requested_at(serial), contact.point));
-    limit_share.update(&watch.serials, share, path)
+    (limit_share.update(&watch.serials, share, path), near)
 }
 
 /// Reduces the displacements of the contacts of a body to the strain limit; zero is no limit.
