@@ -11,7 +11,7 @@ use super::blend::Blending;
 use super::neighbourhood::Neighbourhood;
 use crate::contact::{SurfacePoint, SurfaceQuery};
 use crate::mesh::Surface;
-use crate::tensor::across;
+use crate::tensor::{across, outer};
 
 /// Newton steps at most; three or four are usual.
 const STEPS: usize = 12;
@@ -21,6 +21,8 @@ const SETTLED: f64 = 1e-5;
 const CROSSINGS: usize = 16;
 /// Least `1 + s kappa`: near the centre of curvature the closest point is not unique.
 const LEAST_STRETCH: f64 = 0.1;
+/// Barycentric coordinate below which a point lies on an edge of its triangle.
+const ON_EDGE: f64 = 1e-9;
 
 /// The drawn surface below a smooth one.
 #[derive(Clone, Copy)]
@@ -99,7 +101,7 @@ impl SmoothSurface {
     ) -> FootPoint {
         let start = (closest.triangle, closest.position);
         let smooth = if self.is_off_creases(closest) { self.follow(drawn.surface, p, start, near) } else { None };
-        smooth.unwrap_or_else(|| on_crease(closest))
+        smooth.unwrap_or_else(|| on_crease(drawn.surface, closest))
     }
 
     /// Whether the smooth surface is surely farther than `distance`, m: no quadric deviates from the drawn triangles by as much as
@@ -113,7 +115,7 @@ impl SmoothSurface {
     fn is_off_creases(&self, closest: &SurfacePoint) -> bool {
         let creases = &self.creases[closest.triangle as usize];
         // The edge (k, k + 1) lies opposite to the corner k + 2.
-        !(0..3).any(|k| creases[k] && closest.barycentric[(k + 2) % 3] < 1e-9)
+        !(0..3).any(|k| creases[k] && closest.barycentric[(k + 2) % 3] < ON_EDGE)
     }
 
     /// The foot on the smooth side of a triangle; `None` where that side ends.
@@ -181,18 +183,29 @@ impl SmoothSurface {
     }
 }
 
-/// The closest point of the drawn triangles, as on a point or an edge: the normal turns with `p` about it.
-fn on_crease(closest: &SurfacePoint) -> FootPoint {
+/// The closest point of the drawn triangles. The normal turns with `p` about a corner, and about an edge across it only: along the
+/// edge the point moves with `p`, as it does within a triangle.
+fn on_crease(surface: &Surface, closest: &SurfacePoint) -> FootPoint {
     let (normal, distance) = (closest.normal, closest.signed_distance);
     let across = across(normal);
-    let turning = if distance.abs() > 1e-9 { across * (1.0 / distance) } else { DMat3::ZERO };
+    let corners = surface.corners(closest.triangle);
+    let mut beside = (0..3).filter(|&k| closest.barycentric[k] < ON_EDGE);
+    let shift = match (beside.next(), beside.next()) {
+        (None, _) => across,
+        (Some(k), None) => {
+            let edge = (corners[(k + 2) % 3] - corners[(k + 1) % 3]).normalize_or_zero();
+            outer(edge, edge)
+        }
+        _ => DMat3::ZERO,
+    };
+    let turning = if distance.abs() > 1e-9 { (across - shift) * (1.0 / distance) } else { DMat3::ZERO };
     FootPoint {
         triangle: closest.triangle,
         position: closest.position,
         normal,
         distance,
         turning,
-        shift: DMat3::ZERO,
+        shift,
         on_crease: true,
     }
 }

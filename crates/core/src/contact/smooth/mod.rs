@@ -342,4 +342,22 @@ pub(crate) mod tests {
         assert!(followed.expect("a foot").position.distance(beside.position) < 1e-12);
         assert!(smooth.foot_anywhere(drawn, DVec3::splat(f64::NAN), &mut near).is_none());
     }
+
+    /// Beside an edge the foot moves along it and its normal turns across it; beside a corner the foot stays.
+    #[test]
+    fn derivatives_of_a_foot_on_a_crease_are_exact() {
+        let surface = cube();
+        let (smooth, query) = (SmoothSurface::new(&surface), SurfaceQuery::new(&surface).expect("triangles"));
+        let (drawn, mut near) = (DrawnSurface { surface: &surface, query: &query }, near(&smooth));
+        let mut foot = |p| smooth.foot_anywhere(drawn, p, &mut near).expect("a foot");
+        for p in [DVec3::new(1.1, 0.5, 1.05), DVec3::new(0.3, -0.02, 1.2), DVec3::new(1.1, 1.2, 1.05)] {
+            let (at, h) = (foot(p), 1e-5);
+            assert!(at.on_crease);
+            for axis in DVec3::AXES {
+                let (ahead, behind) = (foot(p + h * axis), foot(p - h * axis));
+                assert!(((ahead.normal - behind.normal) / (2.0 * h) - at.turning * axis).length() < 1e-6);
+                assert!(((ahead.position - behind.position) / (2.0 * h) - at.shift * axis).length() < 1e-6);
+            }
+        }
+    }
 }
