@@ -22,8 +22,8 @@ NODULES = ((11e3, 5e-3), (26e3, 5e-3), (13.5e3, 7e-3))
 # take a minute, and are none of ours.
 LARGE = [np.array([0.266, 0.293])]
 ASIDE, BESIDE = 5e-3, np.array([0.0696, 0.0930])
-# Largest difference from the direct contrasts: a body of several materials has a narrower mask, from which more is taken off for
-# its elements than from the even one.
+# Largest difference from the direct contrasts: a body of several materials has a narrower mask, from which more is
+# taken off for its elements than from the even one.
 POINTS = 0.03
 
 
