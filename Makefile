@@ -3,6 +3,8 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 ARGS ?=
+# Tests start hundreds of processes: where compiled modules are not kept, each of them compiles SciPy and the like anew.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: demo test campaigns install web site wheel sdist other-build sanitize lint check-systems docs viewer check-tools clean
 .DEFAULT_GOAL := demo

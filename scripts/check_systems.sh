@@ -22,6 +22,7 @@ for word; do
 done
 EOF
 chmod +x "$folder/empty"
+# In the profile and folder of other builds: the macros and build scripts that these compiled run here too.
 for target; do
     if ! timeout 60 rustup target add "$target" >/dev/null 2>&1; then
         echo "$target: not checked, its library cannot be had: rustup target add $target" >&2
@@ -29,6 +30,6 @@ for target; do
     fi
     name=${target//-/_}
     env "CC_$name=$folder/empty" "CXX_$name=$folder/empty" "AR_$name=$folder/empty" CC_MASM_ASM="$folder/empty" \
-        PYO3_CROSS_PYTHON_VERSION=3.10 cargo check --quiet --locked --target "$target" --target-dir "$folder" -p palpate-python --lib
+        PYO3_CROSS_PYTHON_VERSION=3.10 cargo check --release --quiet --locked --target "$target" -p palpate-python --lib
     echo "$target: compiles"
 done

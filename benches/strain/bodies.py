@@ -114,16 +114,30 @@ def _cuboid(name: str, axes: list[np.ndarray], is_held: str, place: tuple[float,
     return Pressed(name, mesh, np.repeat(held[:, None], 3, axis=1), top, np.array([0.0, 0.0, 1.0]), depths)
 
 
+def _divided(ends: np.ndarray, centre: float, reach: float) -> np.ndarray:
+    """Divide the cells between some ends in two where they are within a distance of a place."""
+    near = (ends[:-1] < centre + reach - 1e-9) & (ends[1:] > centre - reach + 1e-9)
+    return np.sort(np.concatenate([ends, 0.5 * (ends[:-1] + ends[1:])[near]]))
+
+
 def cuboids() -> Iterator[Pressed]:
-    """Return a cantilever, a plate clamped at two sides and a block beside its edge."""
+    """Return a cantilever, a plate clamped at two sides and a block beside its edge, finer below the sphere."""
     equal = np.linspace
-    axes = [equal(0, 0.1, 21), equal(0, 0.02, 5), equal(0, 0.02, 5)]
+    axes = [_divided(equal(0, 0.1, 21), 0.08, 0.005), *(_divided(equal(0, 0.02, 5), at, 0.005) for at in (0.01, 0.02))]
     yield _cuboid("cantilever", axes, "left", (0.08, 0.01), np.array([0.005, 0.01, 0.02]))
-    axes = [equal(0, 0.1, 19), 0.03 + graded(-0.03, 0.03, 0.0, FINE, 0.006), equal(0, 0.01, 4)]
+    across = 0.03 + graded(-0.03, 0.03, 0.0, FINE, 0.006)
+    axes = [
+        _divided(equal(0, 0.1, 19), 0.05, 0.009),
+        _divided(across, 0.03, 0.009),
+        _divided(equal(0, 0.01, 4), 0.01, 0.003),
+    ]
     yield _cuboid("plate at two sides", axes, "both ends", (0.05, 0.03), np.array([0.005, 0.01, 0.015]))
     beside = 0.012
-    x = graded(0.0, 0.06, beside, FINE, CELL)
-    axes = [x, 0.03 + graded(-0.03, 0.03, 0.0, FINE, CELL), 0.03 - graded(0.0, 0.03, 0.0, FINE, CELL)[::-1]]
+    axes = [
+        _divided(graded(0.0, 0.06, beside, FINE, CELL), beside, 0.008),
+        _divided(0.03 + graded(-0.03, 0.03, 0.0, FINE, CELL), 0.03, 0.008),
+        _divided(0.03 - graded(0.0, 0.03, 0.0, FINE, CELL)[::-1], 0.03, 0.008),
+    ]
     yield _cuboid("12 mm from an edge", axes, "bottom", (beside, 0.03), np.array([0.003, 0.006, 0.009]))
 
 

@@ -42,21 +42,22 @@ def run(*command: object, timeout: float = 280, **environment: str) -> str:
 
 @pytest.fixture(scope="module")
 def prefix(tmp_path_factory) -> Path:
-    """Where the library is installed; built together with the extension, so that both share what is compiled."""
-    run(
-        "cargo",
-        "build",
-        "--release",
-        "--quiet",
-        "--manifest-path",
-        ROOT / "Cargo.toml",
-        *("-p", "palpate-capi"),
-        "-p",
-        "palpate-python",
-    )
+    """Where the library is installed."""
     where = tmp_path_factory.mktemp("prefix")
-    run(ROOT / "scripts/install_c.sh", where, Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "release")
+    run(ROOT / "scripts/install_c.sh", where, built_libraries(ROOT))
     return where
+
+
+def built_libraries(workspace: Path) -> Path:
+    """Folder of the libraries of a workspace, which are built with the test of the header.
+
+    Cargo then takes what it has compiled for the tests of all crates. Built by themselves the libraries would ask for
+    fewer features of their dependencies; built with the extension, that would be compiled again, for another Python.
+    """
+    target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
+    command = ("cargo", "test", "--release", "--quiet", "--manifest-path", workspace / "Cargo.toml")
+    run(*command, "--workspace", "--test", "header", "--no-run", "--target-dir", target, timeout=900)
+    return target / "release/deps"
 
 
 @pytest.fixture(scope="module")
@@ -275,11 +276,13 @@ def grown_library(folder: Path) -> Path:
         if crate.name != "capi":
             (crates / crate.name).symlink_to(crate)
     shutil.copytree(ROOT / "crates/capi", crates / "capi", ignore=shutil.ignore_patterns("tests", "examples"))
+    (crates / "capi/tests").mkdir()
+    (crates / "capi/tests/header.rs").write_text("//! Tests nothing: cargo builds the library with it.\n")
     for name in ("Cargo.toml", "Cargo.lock"):
         shutil.copy(ROOT / name, copy)
     # By another name, for it is built beside the other one.
     manifest = (crates / "capi/Cargo.toml").read_text().replace('name = "palpate"', 'name = "palpate_grown"')
-    (crates / "capi/Cargo.toml").write_text(manifest.replace('["cdylib", "staticlib", "lib"]', '["cdylib"]'))
+    (crates / "capi/Cargo.toml").write_text(manifest.replace('["cdylib", "staticlib", "lib"]', '["cdylib", "lib"]'))
     grown = []
     for source in (crates / "capi/src").glob("*.rs"):
         text = source.read_text()
@@ -296,11 +299,9 @@ def grown_library(folder: Path) -> Path:
             grown += [name] * count
         source.write_text(text.replace("//!", "#![allow(missing_docs)]\n//!", 1) if source.name == "lib.rs" else text)
     assert len(grown) == 6
-    target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
-    build = ("cargo", "build", "--release", "--quiet", "--manifest-path", copy / "Cargo.toml")
-    run(*build, "-p", "palpate-capi", "-p", "palpate-python", "--target-dir", target, timeout=900)
+    libraries = built_libraries(copy)
     (folder / "lib").mkdir()
-    shutil.copy(target / "release/libpalpate_grown.so", folder / "lib/libpalpate.so.1")
+    shutil.copy(libraries / "libpalpate_grown.so", folder / "lib/libpalpate.so.1")
     return folder / "lib"
 
 

@@ -5,9 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import pickle
 import subprocess
-import sys
 import threading
 import time
 import warnings
@@ -19,6 +17,7 @@ from palpate import _native
 from palpate.body import Body, SurfaceRegion, surface_region
 from palpate.errors import BodyError, StoreError, StoreWarning
 from palpate.green.bounds import CHOSEN
+from palpate.green.child_process import end_child, send_job, send_line, start_child
 from palpate.green.claim import waiting_message
 from palpate.green.function import GreensFunction
 from palpate.green.job import Job
@@ -79,19 +78,12 @@ class BackgroundPrecompute:
             self._touchable = self._unfetched.touchable_nodes
         memory = job.allowed(None)
         job.make_room()
-        # In a session of its own: Ctrl-C in a terminal is for this process, which ends the child.
-        self._child = child = subprocess.Popen(
-            [sys.executable, "-m", "palpate.green.child"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            start_new_session=True,
-        )
+        self._child = child = start_child("palpate.green.child")
         names = ("arguments", "precision_name", "within", "description", "path", "memory", "first", "key")
         values = (job.problem, precision, CHOSEN, job.description, job.target, memory, job.first, job.key)
         assert child.stdin is not None and child.stdout is not None
         self._input = child.stdin
-        pickle.dump(dict(zip(names, values, strict=True)), self._input)
-        self._input.flush()
+        send_job(self._input, dict(zip(names, values, strict=True)))
         self._listener = threading.Thread(
             target=self._listen, args=(child.stdout,), name="palpate-columns", daemon=True
         )
@@ -218,10 +210,8 @@ class BackgroundPrecompute:
         wanted = np.intersect1d(surface_region(self.body, np.asarray(nodes), "painted"), self._job.region)
         if self.is_complete or self.error is not None or not len(wanted):
             return
-        line = json.dumps(np.searchsorted(surface, wanted).tolist()) + "\n"
         with contextlib.suppress(OSError):  # it has ended meanwhile
-            self._input.write(line.encode())
-            self._input.flush()
+            send_line(self._input, np.searchsorted(surface, wanted).tolist())
             with self._changed:
                 self._painted = np.union1d(self._painted, wanted)
 
@@ -242,13 +232,7 @@ class BackgroundPrecompute:
         """End the process; what it has finished stays in the partial file."""
         if self._child is None:
             return
-        with contextlib.suppress(OSError):
-            self._input.close()
-        try:
-            self._child.wait(2.0)
-        except subprocess.TimeoutExpired:
-            self._child.kill()
-            self._child.wait()
+        end_child(self._child)
         self._listener.join()
         assert self._child.stdout is not None
         self._child.stdout.close()

@@ -5,9 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import pickle
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
@@ -15,6 +13,7 @@ from pathlib import Path
 
 from palpate import _native
 from palpate.green.background import NICEST
+from palpate.green.child_process import end_child, send_job, send_line, start_child
 from palpate.green.series import SeriesJob
 
 # Between two looks at the file and at the tools, s.
@@ -121,26 +120,19 @@ class BackgroundSeries:
         seen = self._look(number, file, None)
         if self._counts[number][0] == self._counts[number][1] > 0:
             return
-        child = subprocess.Popen(
-            [sys.executable, "-m", "palpate.green.series_child"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            # In a session of its own: Ctrl-C in a terminal is for this process, which ends the child.
-            start_new_session=True,
-        )
+        child = start_child("palpate.green.series_child")
         assert child.stdin is not None and child.stdout is not None
         listener = threading.Thread(target=self._listen, args=(number, child.stdout), daemon=True)
         listener.start()
         try:
             with contextlib.suppress(OSError):
-                pickle.dump(_arguments(job), child.stdin)
-                child.stdin.flush()
+                send_job(child.stdin, _arguments(job))
             last = None
             while child.poll() is None and not self._closing.wait(PAUSE):
                 last = self._steer(job, last, child)
                 seen = self._look(number, file, seen)
         finally:
-            _end(child)
+            end_child(child)
             listener.join()
             child.stdout.close()
         self._look(number, file, seen)
@@ -156,8 +148,7 @@ class BackgroundSeries:
             return last
         assert child.stdin is not None
         with contextlib.suppress(OSError):  # it has ended meanwhile
-            child.stdin.write((json.dumps(list(point)) + "\n").encode())
-            child.stdin.flush()
+            send_line(child.stdin, list(point))
         return point
 
     def _look(self, number: int, file: _native.SeriesFile, seen: tuple[int, int] | None) -> tuple[int, int] | None:
@@ -198,17 +189,6 @@ def _arguments(job: SeriesJob) -> dict[str, object]:
         # One processor is left to the loop.
         "cpus": ours[1:] or ours,
     }
-
-
-def _end(child: subprocess.Popen[bytes]) -> None:
-    assert child.stdin is not None
-    with contextlib.suppress(OSError):
-        child.stdin.close()
-    try:
-        child.wait(2.0)
-    except subprocess.TimeoutExpired:
-        child.kill()
-        child.wait()
 
 
 def _identity(path: Path) -> tuple[int, int]:

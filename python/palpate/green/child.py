@@ -1,41 +1,32 @@
 """Child process that computes columns beside a running force loop: ``python -m palpate.green.child``.
 
-It is given the problem as a pickle on its standard input, then a line of JSON for every region that is to come next,
-and writes a line of JSON on its standard output for whatever has happened. Where its input ends the program that
-started it is gone: it ends at once, and what is finished stays in the partial file.
+After the job it is given the nodes of every region that is to come next. What is finished stays in the partial file.
 """
 
 from __future__ import annotations
 
 import contextlib
-import json
-import os
-import pickle
-import sys
 import threading
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any, BinaryIO
 
 from palpate import _native
 from palpate.errors import Error
+from palpate.green.child_process import compute_and_exit, progress_sender, received_job, received_lines, send
 from palpate.green.claim import claimed
 
 
 class _NextNodes:
     """Nodes to be computed next, read from standard input on a thread."""
 
-    def __init__(self, stream: BinaryIO):
-        self._stream, self._lock = stream, threading.Lock()
+    def __init__(self):
+        self._lock = threading.Lock()
         self._nodes: list[int] = []
         threading.Thread(target=self._read, daemon=True).start()
 
     def _read(self) -> None:
-        for line in self._stream:
+        for nodes in received_lines():
             with self._lock:
-                self._nodes += json.loads(line)
-        # Not sys.exit: threads of the computation would be waited for.
-        os._exit(0)
+                self._nodes += nodes
 
     def take(self) -> list[int] | None:
         """Nodes that have come since, as ranks among the surface nodes; None for none."""
@@ -47,20 +38,20 @@ class _NextNodes:
 class _StoreWatch:
     """Reports that another process computes the store, and what that has ready."""
 
-    def __init__(self, path: Path, send: Callable[..., None]):
-        self._path, self._send = path, send
+    def __init__(self, path: Path):
+        self._path = path
         self._seen: int | None = None
         self._waits = False
 
     def __call__(self) -> None:
         if not self._waits:
             self._waits = True
-            self._send(waiting=True)
+            send(waiting=True)
         with contextlib.suppress(OSError):
             now = self._path.stat().st_ino
             if now != self._seen:
                 self._seen = now
-                self._send(theirs=True)
+                send(theirs=True)
 
 
 def _is_finished(path: Path, key: str) -> bool:
@@ -74,32 +65,17 @@ def _is_finished(path: Path, key: str) -> bool:
 
 def main() -> None:
     """Compute what standard input asks for."""
-    arguments = pickle.load(sys.stdin.buffer)
-    painted, sent = _NextNodes(sys.stdin.buffer), None
-
-    def send(**message: Any) -> None:
-        sys.stdout.write(json.dumps(message) + "\n")
-        sys.stdout.flush()
-
-    def progress(done: int, columns: int) -> None:
-        nonlocal sent
-        if sent != (done, columns):
-            sent = (done, columns)
-            send(done=done, columns=columns)
-
-    growth = (arguments.pop("first"), painted.take, lambda nodes: send(ready=nodes))
+    arguments = received_job()
+    growth = (arguments.pop("first"), _NextNodes().take, lambda nodes: send(ready=nodes))
     key, path = arguments.pop("key"), arguments["path"]
-    try:
-        with claimed(path, _StoreWatch(path, send)) as claim:
+
+    def compute() -> None:
+        with claimed(path, _StoreWatch(path)) as claim:
             if not _is_finished(path, key):
+                progress = progress_sender("columns")
                 _native.GreenCore.precompute_to(**arguments, progress=progress, growth=growth, claim=claim)
-        send(finished=True)
-    except Error as error:
-        send(error=str(error))
-    except OSError as error:
-        send(error=f"{arguments['path']}: {error.strerror or error}")
-    # The reading thread holds the lock of standard input, with which the interpreter cannot end.
-    os._exit(0)
+
+    compute_and_exit(compute, path)
 
 
 if __name__ == "__main__":

@@ -53,6 +53,19 @@ def with_stored_series(built: BuiltScene) -> BuiltScene:
     return _with(built, lambda _: radii, stored_series)
 
 
+def with_series_of_tools(built: BuiltScene) -> BuiltScene:
+    """Give bodies what is stored of the series for tools that have come; what they have of the others stays."""
+    radii = sphere_radii(built)
+
+    def of_body(body: BuiltBody) -> BuiltBody:
+        known = dict(body.series)
+        new = series_jobs(body, [radius for radius in radii if radius not in known])
+        found = tuple((job.radius, None if body.is_growing else stored_series(job)) for job in new)
+        return replace(body, series=body.series + found)
+
+    return replace(built, bodies=tuple(map(of_body, built.bodies)))
+
+
 def stored_series(job: SeriesJob) -> _native.Series | None:
     """Return what is stored of a series."""
     return job.file().load()

@@ -17,7 +17,7 @@ from palpate.errors import SceneError, SimulationError
 from palpate.green import GreensFunction, precompute
 from palpate.scene import BuiltBody, BuiltScene, Scene, ToolTable
 from palpate.scene.devices import KINDS, device_change, tables_of_tools
-from palpate.scene.series import with_stored_series
+from palpate.scene.series import with_series_of_tools, with_stored_series
 from palpate.scene.tables import BodyTable, SceneTables
 from palpate.simulation.arguments import body_arguments, tool_arguments
 from palpate.simulation.connecting import connect_tool, require_devices, warn_if_limited
@@ -173,9 +173,10 @@ class SceneEditing:
         scene = self.scene.model_copy(
             update={"tools": [*tools, tool], "device": first, "additional_devices": additional}
         )
-        scene = BuiltScene(scene, self.bodies).scene
-        arguments = tool_arguments(scene, rank)
-        self._take(scene, self.bodies, lambda: _native.add_tool(self._core, arguments))
+        built = with_series_of_tools(BuiltScene(scene, self.bodies))
+        arguments = tool_arguments(built.scene, rank)
+        self._take(built.scene, built.bodies, lambda: _native.add_tool(self._core, arguments))
+        self._continue_series()
         if given is not None:
             self._given[rank] = given
         if self._running and (given is not None or kind != "simulated"):

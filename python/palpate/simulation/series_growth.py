@@ -84,8 +84,6 @@ class SeriesGrowth:
 
     def _offer_series(self) -> None:
         """Hand what is known over again, to a loop whose bodies or tools have changed."""
-        if not self._running:
-            return
         for rank, body in enumerate(self.bodies):
             for radius, known in body.series:
                 if known is not None:

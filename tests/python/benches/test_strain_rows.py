@@ -7,8 +7,11 @@ import pytest
 
 from benches import contact_peers
 from benches.strain import bodies, peers
-from benches.strain.beside import Row, table
+from benches.strain.beside import Row, pressed, table
 from benches.strain.solid import Solid
+
+# Largest error of a force beside a full solution on the same mesh.
+ALLOWED = 0.02
 
 
 def test_a_body_without_a_full_solution_is_an_error(monkeypatch, tmp_path):
@@ -42,3 +45,16 @@ def test_the_bodies_of_cuboids_have_a_full_solution_at_every_depth():
     for case in bodies.cuboids():
         assert stored[case.name]["depths"] == case.depths.tolist()
         assert len(stored[case.name]["forces"]) == len(case.depths), case.name
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["cantilever", "12 mm from an edge"])
+def test_bodies_that_bend_and_end_have_the_force_of_a_full_solution(name, tmp_path):
+    """A cantilever bent by a fifth of its length, and a block beside its edge; the linear law is 17 and 5 % off."""
+    (case,) = (case for case in bodies.cuboids() if case.name == name)
+    force, stated = pressed(case, "neo-hookean", True, tmp_path)
+    errors = np.abs(force / case.full() - 1.0)
+    assert errors.max() < ALLOWED
+    assert (errors < stated).all()
+    for factor in (0.95, 1.05, -1.0):
+        assert np.abs(factor * force / case.full() - 1.0).max() > ALLOWED

@@ -135,6 +135,7 @@ def test_a_stylus_pressed_and_turned_through_a_point_of_the_star(loops):
 
 
 @pytest.mark.slow
+@pytest.mark.campaign(2)
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize("name", ["star", "cup", "torus", "kidney", "doll", "valley 60", "ridge 30"])
 def test_many_deep_presses(loops, name, rounds):

@@ -73,6 +73,7 @@ def test_no_first_touch_computes_more_than_three_times_the_force_at_a_millimetre
 
 
 @pytest.mark.slow
+@pytest.mark.campaign(2)
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize("name", ["kidney in full", "liver in full", "doll", "block", "torus", "cup", "star"])
 def test_many_first_touches_on_every_body(loops, name, rounds):

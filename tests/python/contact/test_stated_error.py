@@ -86,14 +86,16 @@ def test_a_round_ellipsoid_has_the_force_and_the_work_of_a_sphere(tmp_path):
 
 
 @pytest.mark.slow
-def test_the_stated_error_covers_the_true_one_in_most_of_400_presses(tmp_path):
+def test_the_stated_error_covers_the_true_one_in_most_of_400_presses(tmp_path, request):
+    """Of every fourth body but in whole campaigns."""
+    every = 1 if request.config.getoption("--whole") else 4
+    bodies = [body for body in BODIES.values() if body.name.startswith("random")][::every]
     covered, stated_errors = [], []
-    for body in BODIES.values():
-        if body.name.startswith("random"):
-            forces, stated = body.pressed(tmp_path)
-            covered += (np.abs(forces / body.forces - 1.0) <= stated).tolist()
-            stated_errors += stated.tolist()
-    assert len(covered) > 380
+    for body in bodies:
+        forces, stated = body.pressed(tmp_path)
+        covered += (np.abs(forces / body.forces - 1.0) <= stated).tolist()
+        stated_errors += stated.tolist()
+    assert len(covered) > 380 / every
     assert np.mean(covered) >= 0.95
     # It says something: the bodies are small beside the elements, and the bound is not.
     assert np.median(stated_errors) < 0.09

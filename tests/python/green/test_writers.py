@@ -134,6 +134,7 @@ def test_columns_that_another_program_changes_are_refused_and_computed_again(bod
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)
 def test_races_of_two_writers_leave_a_store_that_is_right_or_none(body, expected, tmp_path, rounds):
     random = np.random.default_rng(7)
     pairs = list(itertools.product(FIRST, FIRST))

@@ -97,6 +97,26 @@ def test_a_running_loop_takes_the_series_up_when_the_tool_has_lifted(beam):
         assert simulation.series is None
 
 
+def test_a_tool_of_another_radius_gets_its_series_in_the_running_loop(beam):
+    smaller = 0.006
+    with Simulation(with_series(beam)) as simulation:
+        assert simulation.series is None
+        simulation.add_tool(radius=f"{smaller} m", contact="local", friction=0.0)
+        assert [radius for radius, _ in simulation.bodies[0].series] == [RADIUS, smaller]
+        background = simulation.series
+        assert background is not None
+        assert background.wait(120.0), background.error
+        assert simulation.bodies[0].series[1][1].is_complete
+        tables = simulation.scene
+    # It is that of a scene with both tools, and another one than without.
+    path = np.stack([np.full_like(path_of_press(), 1.0), path_of_press() - (0.0, 0.0, RADIUS - smaller)], axis=1)
+    changed, bodies = Simulation(beam), with_series(BuiltScene(tables, beam.bodies))
+    changed.add_tool(radius=f"{smaller} m", contact="local", friction=0.0)
+    forces = changed.run(path)[:, 1]
+    assert np.array_equal(forces, Simulation(bodies).run(path)[:, 1])
+    assert forces[-1, 2] < 0.93 * Simulation(without_series(bodies)).run(path)[-1, 1, 2]
+
+
 def test_a_recording_has_the_series_that_its_loop_had(beam, tmp_path):
     with Simulation(beam) as simulation:
         background = simulation.series

@@ -129,7 +129,7 @@ def page(chromium, program, test):
         yield page
 
 
-@pytest.mark.campaign(4)
+@pytest.mark.campaign(6)
 @pytest.mark.parametrize(("test", "parameters"), page_tests())
 def test_of_the_page(request, test, parameters):
     wanted = [name for name in inspect.signature(test).parameters if name not in parameters]

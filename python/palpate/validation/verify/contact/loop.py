@@ -81,12 +81,20 @@ def straight(start: Sequence[float], end: Sequence[float], step: float) -> np.nd
     return start + np.linspace(0, 1, count)[:, None] * (end - start)
 
 
-def pressed(body: Body, tool: Mapping[str, Any], height: float, depths: np.ndarray, reach: float) -> np.ndarray:
+def pressed(
+    body: Body,
+    tool: Mapping[str, Any],
+    height: float,
+    depths: np.ndarray,
+    reach: float,
+    green: GreensFunction | None = None,
+) -> np.ndarray:
     """Return forces (n,), N, along z on a device that presses a tool into the middle of the top, ever deeper.
 
     The tool's origin is ``height`` over its lowest point, m; nodes within a ``reach`` of the middle may be touched.
+    Without the body's Green's function it is computed.
     """
-    simulation = loop_of(body, green_of(body, touch=top_nodes(body, reach)), [tool])
+    simulation = loop_of(body, green or green_of(body, touch=top_nodes(body, reach)), [tool])
     top = top_middle(body) + (0, 0, height)
     lead = straight(top + (0, 0, 1e-3), top, 5e-5)
     return simulation.run(np.vstack([lead, top - np.outer(depths, (0, 0, 1))]))[len(lead) :, 2]
