@@ -23,12 +23,10 @@ const TARGET: f64 = 0.9 * TOLERANCE;
 /// reduction could be felt as a jump.
 const SMALL_SURPLUS: f64 = 0.05;
 const LARGEST_SMALL_STEP: f64 = 0.01;
-/// Ticks over which a surplus decays: rounding would add up over minutes of motion on closed paths. A tool passes a corner in a few
-/// seconds; were the surplus to decay in one, slow paths would release more than the tolerated part.
-const DECAY_TICKS: f64 = 10_000.0;
+/// Ticks over which a surplus decays: rounding would add up over minutes of motion on closed paths.
+const DECAY_TICKS: f64 = 1000.0;
 /// Longest motion in a tick, over the tool's radius, for which the work is known: to half the change of the force times the
-/// motion. In shorter motions the rule of trapezoids is better by more than their length: were the tolerance in proportion to it,
-/// slow closed paths over a corner would release half a thousandth of their peak energy beside the tolerated surplus.
+/// motion.
 const LONGEST_MOTION: f64 = 0.1;
 
 /// A contact in a tick, as the observer reads it.
@@ -138,11 +136,7 @@ impl PassivityObserver {
                 0.5 * (before.force + now.force).dot(now.position - before.position)
                     - 0.5 * (before.torque + now.torque).dot(rotation)
                     - now.dissipated
-                    + 0.5
-                        * (now.force - before.force).length()
-                        * now.largest_motion
-                        * relative_motion
-                        * relative_motion.sqrt()
+                    + 0.5 * (now.force - before.force).length() * now.largest_motion * relative_motion
             } else {
                 now.stored
             };

@@ -55,9 +55,6 @@ pub struct LocalScratch {
     pub(super) force_change: f64,
     /// Steps of Newton's method for the latest body.
     pub newton_steps: usize,
-    /// Contacts whose feet are on creases as of the latest step, as bits, and whether one went on or off a crease in a late step.
-    on_crease: u32,
-    pub(super) passes_crease: bool,
     pub(super) cells: Box<CellScratch>,
     /// The pieces next to the latest tool, and the slot of its contact.
     pub footprint: FootprintScratch,
@@ -82,14 +79,6 @@ impl LocalScratch {
             self.body = Some(body);
             self.weights.iter_mut().for_each(|weights| weights.near.invalidate());
         }
-    }
-
-    /// Notes which feet are on creases, and whether that still changes in a late step. The gradient of the compliance jumps at a
-    /// crease, where the closest point stops: a tool may rest just there, and the steps go to and fro.
-    pub(super) fn note_creases(&mut self, count: usize, is_late: bool) {
-        let before = self.on_crease;
-        self.on_crease = self.responses[..count].iter().fold(0, |bits, at| bits << 1 | u32::from(at.foot.on_crease));
-        self.passes_crease = is_late && (self.passes_crease || before != self.on_crease);
     }
 
     /// Takes the step, and extrapolates forces and offsets linearly.
@@ -232,8 +221,6 @@ impl LocalScratch {
             steps: [DVec3::ZERO; MAX_CONTACTS],
             best: vec![(DVec3::ZERO, LocalResponse::default()); MAX_CONTACTS],
             has_best: false,
-            on_crease: 0,
-            passes_crease: false,
             force_change: 0.0,
             newton_steps: 0,
             cells: Box::default(),

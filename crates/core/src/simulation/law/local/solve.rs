@@ -48,8 +48,6 @@ const USUAL_STEPS: usize = 10;
 const LONGEST_STEP: f64 = 0.5;
 /// Length of the last step, over the tool's radius, beyond which the method has diverged.
 const DIVERGED_STEP: f64 = 2e-3;
-/// The same for a tool that rests on a crease, where the steps from both sides lead across it.
-const DIVERGED_ON_CREASE: f64 = 5e-2;
 /// Most steps with pressure cells; two or three are usual. Each costs a hundred times a closed form.
 pub const MOST_CELL_STEPS: usize = 8;
 /// Residual, over the tool's thickness, beyond which the tool may have left the body: the last evaluation is at the position
@@ -198,7 +196,6 @@ fn solve_equations(
                 continue;
             }
         }
-        local.note_creases(slots.len(), step >= USUAL_STEPS);
         let longest = newton_step(local, system, slots.len());
         let longest = if cells { local.lengthen_by_power_law(slots.len()) } else { longest };
         let bound = trust.longest_step.min(LONGEST_STEP * radius);
@@ -216,7 +213,7 @@ fn solve_equations(
         }
         if step + 1 < most {
             local.take_step(slots.len());
-        } else if !cells && longest > if local.passes_crease { DIVERGED_ON_CREASE } else { DIVERGED_STEP } * radius {
+        } else if !cells && longest > DIVERGED_STEP * radius {
             return Outcome::Diverged;
         }
     }
