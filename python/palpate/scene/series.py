@@ -59,9 +59,8 @@ def with_series_of_tools(built: BuiltScene) -> BuiltScene:
 
     def of_body(body: BuiltBody) -> BuiltBody:
         known = dict(body.series)
-        new = series_jobs(body, [radius for radius in radii if radius not in known])
-        found = tuple((job.radius, None if body.is_growing else stored_series(job)) for job in new)
-        return replace(body, series=body.series + found)
+        new = [radius for radius in radii if radius not in known]
+        return replace(body, series=body.series + _found(body, new, stored_series))
 
     return replace(built, bodies=tuple(map(of_body, built.bodies)))
 
@@ -82,7 +81,13 @@ def _with(
     find: Callable[[SeriesJob], _native.Series | None],
 ) -> BuiltScene:
     def of_body(body: BuiltBody) -> BuiltBody:
-        jobs = series_jobs(body, radii(body))
-        return replace(body, series=tuple((job.radius, None if body.is_growing else find(job)) for job in jobs))
+        return replace(body, series=_found(body, radii(body), find))
 
     return replace(built, bodies=tuple(map(of_body, built.bodies)))
+
+
+def _found(
+    body: BuiltBody, radii: list[float], find: Callable[[SeriesJob], _native.Series | None]
+) -> tuple[tuple[float, _native.Series | None], ...]:
+    """Radii, m, and what is found of their series; nothing while the body's Green's function grows."""
+    return tuple((job.radius, None if body.is_growing else find(job)) for job in series_jobs(body, radii))
