@@ -70,6 +70,8 @@ pub struct LocalResponse {
     /// same by the tool's rotation, N m.
     pub slope: DVec3,
     pub turn: DVec3,
+    pub bend: DMat3,
+    pub edge_slope: DMat3,
     pub friction: FrictionResponse,
     /// Derivative of the force by friction by the position, N/m.
     pub friction_by_position: DMat3,
@@ -134,11 +136,29 @@ pub(super) fn evaluate_sphere(
         Some(_) => foot.distance.signum() * hypot(foot.distance, guess.offset.length()),
         None => foot.distance,
     };
-    body.smooth.weigh(&foot, weights);
+    let smoothed = match contact.is_fading {
+        true => None,
+        false => body.edges.and_then(|edges| edges.smoothed(&foot, guess.place - guess.offset)),
+    };
+    let mut bend = DMat3::ZERO;
+    if let Some(smoothed) = &smoothed {
+        let fixed = FootPoint { shift: DMat3::IDENTITY, turning: DMat3::ZERO, ..smoothed.foot };
+        body.smooth.weigh(&fixed, weights);
+        let fields = blend_fields(weights, body.fields, body.is_hyperelastic);
+        let g = slope(body, guess.force, OtherContacts::default(), &fields);
+        for (n, second) in smoothed.bends {
+            bend -= outer(n, n) * (second * g.dot(n));
+        }
+    }
+    body.smooth.weigh(smoothed.as_ref().map_or(&foot, |smoothed| &smoothed.foot), weights);
     if weights.is_outside() {
         return None;
     }
-    let fields = blend_fields(weights, body.fields, body.is_hyperelastic);
+    let mut fields = blend_fields(weights, body.fields, body.is_hyperelastic);
+    if let Some(smoothed) = &smoothed {
+        let (rho, gradient, _) = smoothed.rho;
+        fields.divide(PLANE_STRAIN, (1.0 / rho, -gradient / (rho * rho)));
+    }
     // A new contact has no force: its approach counts from the present depth.
     let indentation = match contact.is_new {
         true => Indentation::default(),
@@ -146,6 +166,14 @@ pub(super) fn evaluate_sphere(
     };
     *response = LocalResponse::at(body, foot, &fields, indentation);
     response.slope = slope(body, guess.force, others, &fields);
+    if let Some(smoothed) = &smoothed {
+        let (rho, gradient, hessian) = smoothed.rho;
+        let n = response.foot.normal;
+        let Indentation { energy, force, .. } = response.indentation;
+        bend += (hessian * energy - (outer(n, gradient) + outer(gradient, n)) * force) * (1.0 / rho);
+        response.edge_slope = compliance_slope(body, guess.force, &fields);
+    }
+    response.bend = bend;
     if let Some(series) = body.series {
         let (blended, known) = blended_series(series, weights);
         (response.series, response.known) = (Some(blended), known);
@@ -290,7 +318,7 @@ impl LocalResponse {
         let (normal, point) = (foot.normal, foot.position);
         // A matrix is the identity by default.
         let scale = body.scale;
-        let (jacobian, slope_by_force) = (DMat3::ZERO, DMat3::ZERO);
+        let (jacobian, slope_by_force, bend) = (DMat3::ZERO, DMat3::ZERO, DMat3::ZERO);
         Self {
             foot,
             compliance,
@@ -300,6 +328,8 @@ impl LocalResponse {
             scale,
             jacobian,
             slope_by_force,
+            bend,
+            edge_slope: DMat3::ZERO,
             offset_by_position: DMat3::ZERO,
             offset_by_force: DMat3::ZERO,
             friction_by_position: DMat3::ZERO,
@@ -369,7 +399,10 @@ impl LocalResponse {
         };
         self.friction_by_position =
             self.friction.by_displacement - outer(self.friction.by_pressing, n) * indentation.stiffness;
-        self.jacobian = outer(n, n) * indentation.stiffness - turning * indentation.force + self.friction_by_position;
+        self.jacobian = outer(n, n) * indentation.stiffness - turning * indentation.force + self.friction_by_position + self.bend;
+        if self.edge_slope != DMat3::ZERO && self.series.is_none() {
+            self.jacobian = (DMat3::IDENTITY + self.edge_slope).inverse() * self.jacobian;
+        }
         if part > 0.0 {
             (self.offset, self.offset_by_force) = (self.offset * part, self.offset_by_force * part);
             self.jacobian = (DMat3::IDENTITY * (1.0 - part) + self.turning * part) * self.jacobian;
@@ -422,7 +455,8 @@ impl LocalResponse {
 
     /// Derivative of the body's displacement by the position at constant force: the contact moves along the surface.
     pub fn displacement_by_position(&self) -> DMat3 {
-        self.slope_by_force.transpose() * (DMat3::IDENTITY - self.offset_by_position) * self.turned_part
+        let edge = if self.series.is_none() { self.edge_slope.transpose() } else { DMat3::ZERO };
+        self.slope_by_force.transpose() * (DMat3::IDENTITY - self.offset_by_position) * self.turned_part + edge
     }
 
     /// The springs of friction; without a force none is stretched.

@@ -51,6 +51,8 @@ pub struct LocalScratch {
     best: Vec<(DVec3, LocalResponse)>,
     /// Whether there is one.
     pub(super) has_best: bool,
+    /// D.
+    pub(super) descends: bool,
     /// Largest difference of a force from its linear extrapolation, over that force.
     pub(super) force_change: f64,
     /// Steps of Newton's method for the latest body.
@@ -221,6 +223,7 @@ impl LocalScratch {
             steps: [DVec3::ZERO; MAX_CONTACTS],
             best: vec![(DVec3::ZERO, LocalResponse::default()); MAX_CONTACTS],
             has_best: false,
+            descends: false,
             force_change: 0.0,
             newton_steps: 0,
             cells: Box::default(),
@@ -247,6 +250,7 @@ pub fn local_body<'a>(model: &'a Model, bodies: &'a [BodyState], tool: usize, bo
         series: series.map(|series| &series.fields[..]),
         pressed_surface: model.pressed_surfaces[tool][body].as_deref(),
         corners: model.corner_surfaces[tool][body].as_deref(),
+        edges: model.convex_edges[tool][body].as_deref(),
         scale: state.stiffness_scale,
         is_hyperelastic: local.is_hyperelastic,
     })
