@@ -27,7 +27,7 @@ pub use closest::{SurfacePoint, SurfaceQuery};
 pub use compliance::{Touch, raise_eigenvalues, smallest_eigenvalue, touch};
 pub use concavities::Concavities;
 pub use convex_corners::CornerSurface;
-pub use convex_edges::ConvexEdges;
+pub use convex_edges::{BesideEdges, ConvexEdges};
 pub use local::SeriesFields;
 #[cfg(feature = "offline")]
 pub use patch::wide_patch_weights;

@@ -29,7 +29,7 @@ pub struct Model {
     pub(super) pressed_surfaces: Vec<Vec<Option<Arc<PressedSurface>>>>,
     /// By tool and body, for spheres: the sharp convex corners of the surface, where it has any.
     pub(super) corner_surfaces: Vec<Vec<Option<Arc<CornerSurface>>>>,
-    /// Sharp edges
+    /// Sharp convex edges, for spheres under the local law.
     pub(super) convex_edges: Vec<Vec<Option<Arc<ConvexEdges>>>>,
     /// By tool and body, for spheres: where the tool may touch at several places.
     pub(super) concavities: Vec<Vec<Concavities>>,
@@ -125,7 +125,16 @@ impl Model {
         };
         let convex_edges = tools.iter().map(|tool| bodies.iter().map(|body| edges_of(tool, body)).collect()).collect();
         let frames = bodies.iter().map(|body| DQuat::from_mat3(&body.placement.rotation.transpose())).collect();
-        Ok(Self { bodies, tools, frames, regular_compliances, pressed_surfaces, corner_surfaces, convex_edges, concavities })
+        Ok(Self {
+            bodies,
+            tools,
+            frames,
+            regular_compliances,
+            pressed_surfaces,
+            corner_surfaces,
+            convex_edges,
+            concavities,
+        })
     }
 
     /// The same model where a body starts with other higher orders of its displacement: see [`BodyModel::with_series`].

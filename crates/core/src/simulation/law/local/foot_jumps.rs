@@ -55,10 +55,6 @@ pub fn foot_has_jumped(model: &Model, contact: &Contact, response: &LocalRespons
     if local.is_fading || local.is_new || tool.shape.needs_cells() || share_of_contact(model, contact) == 1.0 {
         return false;
     }
-    let edges = model.convex_edges[contact.tool][contact.body].as_deref();
-    if edges.is_some_and(|edges| edges.share_an_edge(&local.foot, &response.foot)) {
-        return false;
-    }
     let travel = place.distance(local.relative_position);
     response.foot.position.distance(local.foot.position) > JUMP_RATIO * travel + JUMP_DISTANCE * tool.radius
         || response.foot.normal.dot(local.foot.normal) < SAME_SIDE
@@ -73,7 +69,6 @@ pub fn replace_jumped_contacts(model: &Model, state: &mut State, solved: SolvedC
             continue;
         }
         any = true;
-        eprintln!("JUMPED {} {:?} -> {:?}", response.foot.on_crease, state.contacts.slots[slot].local.foot.position, response.foot.position);
         let contact = state.contacts.slots[slot];
         if contact.local.force == DVec3::ZERO {
             match contact.additional {

@@ -2,12 +2,12 @@
 
 use glam::DVec3;
 
-use crate::contact::{ConvexEdges, CornerSurface};
 use crate::contact::footprint::PressedSurface;
 use crate::contact::local::{SeriesFields, StrainTerms, effective_modulus, terms_with_pad};
 use crate::contact::regular::{FanFields, PLANE_STRAIN, POISSON, STRAIN_TERMS, WIDTH};
 use crate::contact::shape::ToolShape;
 use crate::contact::smooth::{Blended, DrawnSurface, SmoothSurface};
+use crate::contact::{ConvexEdges, CornerSurface};
 
 /// Data of a body for one tool.
 #[derive(Clone, Copy)]

@@ -119,6 +119,7 @@ impl LocalResponse {
     fn mixed(&self, other: &Self, (share, gradient): (f64, DVec3), force: DVec3) -> Self {
         let softer = other.compliance - self.compliance;
         let mut mixed = *self;
+        mixed.bending = self.bending * (1.0 - share);
         mixed.foot = mixed_foot(&self.foot, &other.foot, share);
         mixed.compliance = self.compliance + softer * share;
         mixed.indentation = mixed_indentation(&self.indentation, &other.indentation, (share, gradient));

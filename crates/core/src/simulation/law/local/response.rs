@@ -3,6 +3,7 @@
 use glam::{DMat3, DVec3};
 
 use super::half_space::{Fields, HalfSpace, Indentation, LocalBody, LocalTool};
+use super::near_edge::NearEdge;
 use super::wrench::{CellMemory, indent_shape, placed_shape};
 use crate::contact::footprint::PressedSurface;
 use crate::contact::local::{
@@ -70,8 +71,8 @@ pub struct LocalResponse {
     /// same by the tool's rotation, N m.
     pub slope: DVec3,
     pub turn: DVec3,
-    pub bend: DMat3,
-    pub edge_slope: DMat3,
+    /// Derivative of the force by the position that comes from sharp edges, N/m.
+    pub bending: DMat3,
     pub friction: FrictionResponse,
     /// Derivative of the force by friction by the position, N/m.
     pub friction_by_position: DMat3,
@@ -90,7 +91,7 @@ pub struct LocalResponse {
     /// Derivative of the offset by the position.
     pub offset_by_position: DMat3,
     /// Derivatives of the slope and of the offset by the force, and of the force by what it would be if neither depended on it.
-    slope_by_force: DMat3,
+    pub slope_by_force: DMat3,
     offset_by_force: DMat3,
     turning: DMat3,
     /// Where the slope is known.
@@ -136,28 +137,16 @@ pub(super) fn evaluate_sphere(
         Some(_) => foot.distance.signum() * hypot(foot.distance, guess.offset.length()),
         None => foot.distance,
     };
-    let smoothed = match contact.is_fading {
-        true => None,
-        false => body.edges.and_then(|edges| edges.smoothed(&foot, guess.place - guess.offset)),
-    };
-    let mut bend = DMat3::ZERO;
-    if let Some(smoothed) = &smoothed {
-        let fixed = FootPoint { shift: DMat3::IDENTITY, turning: DMat3::ZERO, ..smoothed.foot };
-        body.smooth.weigh(&fixed, weights);
-        let fields = blend_fields(weights, body.fields, body.is_hyperelastic);
-        let g = slope(body, guess.force, OtherContacts::default(), &fields);
-        for (n, second) in smoothed.bends {
-            bend -= outer(n, n) * (second * g.dot(n));
-        }
+    let near_edge = NearEdge::find(body, contact, guess, &foot, weights);
+    if near_edge.is_none() {
+        body.smooth.weigh(&foot, weights);
     }
-    body.smooth.weigh(smoothed.as_ref().map_or(&foot, |smoothed| &smoothed.foot), weights);
     if weights.is_outside() {
         return None;
     }
     let mut fields = blend_fields(weights, body.fields, body.is_hyperelastic);
-    if let Some(smoothed) = &smoothed {
-        let (rho, gradient, _) = smoothed.rho;
-        fields.divide(PLANE_STRAIN, (1.0 / rho, -gradient / (rho * rho)));
+    if let Some(near_edge) = &near_edge {
+        near_edge.soften(&mut fields);
     }
     // A new contact has no force: its approach counts from the present depth.
     let indentation = match contact.is_new {
@@ -166,14 +155,9 @@ pub(super) fn evaluate_sphere(
     };
     *response = LocalResponse::at(body, foot, &fields, indentation);
     response.slope = slope(body, guess.force, others, &fields);
-    if let Some(smoothed) = &smoothed {
-        let (rho, gradient, hessian) = smoothed.rho;
-        let n = response.foot.normal;
-        let Indentation { energy, force, .. } = response.indentation;
-        bend += (hessian * energy - (outer(n, gradient) + outer(gradient, n)) * force) * (1.0 / rho);
-        response.edge_slope = compliance_slope(body, guess.force, &fields);
+    if let Some(near_edge) = &near_edge {
+        near_edge.add_derivatives(body, guess, &fields, response);
     }
-    response.bend = bend;
     if let Some(series) = body.series {
         let (blended, known) = blended_series(series, weights);
         (response.series, response.known) = (Some(blended), known);
@@ -249,7 +233,7 @@ pub(super) fn evaluate_shape(
 
 /// Force on the tool from the gradients of the body's compliance and of its motion, N. It is computed from the guessed force, which
 /// agrees with the result when the steps have converged.
-fn slope(body: LocalBody<'_>, force: DVec3, others: OtherContacts, fields: &Fields) -> DVec3 {
+pub(super) fn slope(body: LocalBody<'_>, force: DVec3, others: OtherContacts, fields: &Fields) -> DVec3 {
     let [x, y, z] = force.to_array();
     let products = [x * x, 2.0 * x * y, 2.0 * x * z, y * y, 2.0 * y * z, z * z];
     let own: DVec3 = COMPLIANCE.zip(products).map(|(field, product)| fields.slope(field) * product).sum();
@@ -258,7 +242,7 @@ fn slope(body: LocalBody<'_>, force: DVec3, others: OtherContacts, fields: &Fiel
 }
 
 /// Derivative of the linear part of [`slope`] by the force, columns by components of the force.
-fn compliance_slope(body: LocalBody<'_>, force: DVec3, fields: &Fields) -> DMat3 {
+pub(super) fn compliance_slope(body: LocalBody<'_>, force: DVec3, fields: &Fields) -> DMat3 {
     let [xx, xy, xz, yy, yz, zz] = std::array::from_fn(|k| fields.slope(COMPLIANCE.start + k));
     let column = |[x, y, z]: [DVec3; 3]| (x * force.x + y * force.y + z * force.z) * (1.0 / body.scale);
     DMat3::from_cols(column([xx, xy, xz]), column([xy, yy, yz]), column([xz, yz, zz]))
@@ -318,7 +302,7 @@ impl LocalResponse {
         let (normal, point) = (foot.normal, foot.position);
         // A matrix is the identity by default.
         let scale = body.scale;
-        let (jacobian, slope_by_force, bend) = (DMat3::ZERO, DMat3::ZERO, DMat3::ZERO);
+        let (jacobian, slope_by_force) = (DMat3::ZERO, DMat3::ZERO);
         Self {
             foot,
             compliance,
@@ -328,8 +312,7 @@ impl LocalResponse {
             scale,
             jacobian,
             slope_by_force,
-            bend,
-            edge_slope: DMat3::ZERO,
+            bending: DMat3::ZERO,
             offset_by_position: DMat3::ZERO,
             offset_by_force: DMat3::ZERO,
             friction_by_position: DMat3::ZERO,
@@ -399,9 +382,10 @@ impl LocalResponse {
         };
         self.friction_by_position =
             self.friction.by_displacement - outer(self.friction.by_pressing, n) * indentation.stiffness;
-        self.jacobian = outer(n, n) * indentation.stiffness - turning * indentation.force + self.friction_by_position + self.bend;
-        if self.edge_slope != DMat3::ZERO && self.series.is_none() {
-            self.jacobian = (DMat3::IDENTITY + self.edge_slope).inverse() * self.jacobian;
+        self.jacobian = outer(n, n) * indentation.stiffness - turning * indentation.force + self.friction_by_position;
+        self.jacobian += self.bending;
+        if self.series.is_none() && self.slope_by_force != DMat3::ZERO {
+            self.jacobian = (DMat3::IDENTITY + self.slope_by_force).inverse() * self.jacobian;
         }
         if part > 0.0 {
             (self.offset, self.offset_by_force) = (self.offset * part, self.offset_by_force * part);
@@ -455,8 +439,7 @@ impl LocalResponse {
 
     /// Derivative of the body's displacement by the position at constant force: the contact moves along the surface.
     pub fn displacement_by_position(&self) -> DMat3 {
-        let edge = if self.series.is_none() { self.edge_slope.transpose() } else { DMat3::ZERO };
-        self.slope_by_force.transpose() * (DMat3::IDENTITY - self.offset_by_position) * self.turned_part + edge
+        self.slope_by_force.transpose() * (DMat3::IDENTITY - self.offset_by_position) * self.turned_part
     }
 
     /// The springs of friction; without a force none is stretched.

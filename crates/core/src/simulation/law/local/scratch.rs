@@ -51,8 +51,6 @@ pub struct LocalScratch {
     best: Vec<(DVec3, LocalResponse)>,
     /// Whether there is one.
     pub(super) has_best: bool,
-    /// D.
-    pub(super) descends: bool,
     /// Largest difference of a force from its linear extrapolation, over that force.
     pub(super) force_change: f64,
     /// Steps of Newton's method for the latest body.
@@ -223,7 +221,6 @@ impl LocalScratch {
             steps: [DVec3::ZERO; MAX_CONTACTS],
             best: vec![(DVec3::ZERO, LocalResponse::default()); MAX_CONTACTS],
             has_best: false,
-            descends: false,
             force_change: 0.0,
             newton_steps: 0,
             cells: Box::default(),

@@ -21,12 +21,13 @@ use super::half_space::LocalTool;
 use super::near_corner::{contact_needs_cells, evaluate};
 use super::response::{Guess, LocalResponse, OtherContacts};
 use super::scratch::{LocalScratch, TrustRegion, local_body};
+use super::snap::{MOST_SNAP_STEPS, Snap, stable_jacobian};
 use super::surroundings::surroundings;
 use super::wrench::{CellMemory, placed_shape};
 use crate::contact::local::FrictionResponse;
 use crate::contact::local::cells::Resolution;
 use crate::contact::regular::{WIDTH, blend_fields};
-use crate::contact::{Refusal, patch_weights, raise_eigenvalues, smallest_eigenvalue};
+use crate::contact::{Refusal, patch_weights};
 use crate::simulation::MAX_CONTACTS;
 use crate::simulation::contacts::{Contact, Mode};
 use crate::simulation::input::Controls;
@@ -122,7 +123,6 @@ pub fn local_forces(model: &Model, state: &mut State, mut memory: TickMemory<'_>
             Outcome::Unsolved => return keep_previous_forces(state, slots),
             Outcome::Diverged if last => return keep_previous_forces(state, slots),
             Outcome::Diverged => {
-                eprintln!("DIVERGED");
                 fade_lost_contacts(state, &memory.local.steps[..count], slots);
                 last = true;
                 continue;
@@ -130,8 +130,6 @@ pub fn local_forces(model: &Model, state: &mut State, mut memory: TickMemory<'_>
         }
         let (responses, positions) = (&memory.local.responses, &memory.local.positions);
         let solved = SolvedContacts { responses, positions };
-        let dbg_tick = state.contacts.slots[slots[0]].local.tool_position;
-        if std::env::var("DBG").is_ok() && dbg_tick.x > 0.078 && dbg_tick.x < 0.083 { let r = &memory.local.responses[0]; eprintln!("p {:?} p' {:?} steps {} foot {:?} n {:?} crease {} f {:?} dist {} slope {:?} grad {:?} fading {}", dbg_tick, memory.local.positions[0], memory.local.newton_steps, r.foot.position, r.foot.normal, r.foot.on_crease, r.force, r.foot.distance, r.slope, r.indentation.gradient, state.contacts.slots[slots[0]].local.is_fading); }
         if last || !replace_jumped_contacts(model, state, solved, slots) {
             let energy = observe_energy(model, state, memory.local, slots, body);
             if last || !remove_energy_surplus(model, state, memory.local, slots, energy) {
@@ -182,36 +180,42 @@ fn solve_equations(
     let radius = if cells { tool.shape.thickness() } else { tool.radius };
     let mut trust = TrustRegion::default();
     local.has_best = false;
-    let mut most = most;
-    let mut step = 0;
-    while step < most {
+    let mut snap = Snap::new(state, slots, radius);
+    for step in 0..MOST_SNAP_STEPS {
+        if cells && step == most {
+            break;
+        }
         local.newton_steps = step + 1;
         if !evaluate_contacts(model, state, local, slots, body, controls, step) {
             return Outcome::ContactEnded;
         }
-        if std::env::var("DBG").is_ok() && !cells { let c = &state.contacts.slots[slots[0]].local; let x = c.tool_position.x; if x > 0.9 { let r = &local.responses[0]; let res = local.positions[0] + local.between[0][0] * r.force - local.free_positions[0]; eprintln!("  step {step} p' {:?} res {:?} f {:?} crease {} slope {:?} n {:?} C {:?} jac {:?}", local.positions[0], res, r.force, r.foot.on_crease, r.slope, r.foot.normal, r.compliance, r.jacobian); } }
         if cells {
             let accepted = local.accept_step(slots.len(), step + 1 == most, &mut trust);
             if step + 2 == most && trust.least_residual > AWAY_RESIDUAL * radius && all_away(model, state, local, slots)
             {
                 let from = local.free_positions;
                 local.positions[..slots.len()].copy_from_slice(&from[..slots.len()]);
-                step += 1;
                 continue;
             }
             if !accepted {
-                step += 1;
                 continue;
             }
         }
-        let longest = newton_step(local, system, slots.len());
-        if local.descends && !cells { most = 64; }
+        if snap.goes_on {
+            break;
+        }
+        let (longest, unstable) = newton_step(local, system, slots.len(), cells);
+        snap.is_active |= unstable;
+        let [most, usual] = snap.steps([most, USUAL_STEPS]);
         let longest = if cells { local.lengthen_by_power_law(slots.len()) } else { longest };
         let bound = trust.longest_step.min(LONGEST_STEP * radius);
-        let usual = if most == 64 { 50 } else { USUAL_STEPS };
         if step >= usual || longest > bound {
             let share = (bound / longest).min(if step < usual { 1.0 } else { 0.5 });
             local.steps[..slots.len()].iter_mut().for_each(|step| *step *= share);
+        }
+        let part = snap.part(longest.min(bound));
+        if part < 1.0 {
+            local.steps[..slots.len()].iter_mut().for_each(|step| *step *= part);
         }
         // The coupling of contacts is known after the first step.
         let is_coupled = step > 0 || slots.len() == 1;
@@ -225,8 +229,12 @@ fn solve_equations(
             local.take_step(slots.len());
         } else if !cells && longest > DIVERGED_STEP * radius {
             return Outcome::Diverged;
+        } else {
+            break;
         }
-        step += 1;
+    }
+    for &slot in slots {
+        state.contacts.slots[slot].local.is_snapping = snap.goes_on;
     }
     if cells && trust.least_residual > LARGEST_RESIDUAL * radius { Outcome::Unsolved } else { Outcome::Converged }
 }
@@ -387,25 +395,19 @@ fn evaluate_contacts(
     true
 }
 
-/// One step of Newton's method; returns the longest over the contacts, m.
-fn falling(jacobian: &DMat3, compliance: &DMat3) -> (DMat3, bool) {
-    let symmetric = (*jacobian + jacobian.transpose()) * 0.5;
-    let least = smallest_eigenvalue(&symmetric);
-    if least >= 0.0 { return (*jacobian, false); }
-    let softest = -smallest_eigenvalue(&(*compliance * -1.0));
-    if 1.0 + least * softest > 0.1 { return (*jacobian, false); }
-    (*jacobian + raise_eigenvalues(&symmetric, -0.5 / softest) - symmetric, true)
-}
-
-fn newton_step(local: &mut LocalScratch, system: &mut System, count: usize) -> f64 {
-    local.descends = false;
+/// One step of Newton's method; returns the longest over the contacts, m, and whether one of them is unstable. Steps with pressure
+/// cells are bounded by their residuals instead.
+fn newton_step(local: &mut LocalScratch, system: &mut System, count: usize, cells: bool) -> (f64, bool) {
+    let mut unstable = false;
     for a in 0..count {
         let mut residual = local.positions[a] - local.free_positions[a];
         for b in 0..count {
             let between = local.between[a][b];
             residual += between * local.responses[b].force;
-            let (jacobian, raised) = falling(&local.responses[b].jacobian, &local.between[b][b]);
-            local.descends |= raised;
+            let jacobian = local.responses[b].jacobian;
+            let (jacobian, is_unstable) =
+                if cells { (jacobian, false) } else { stable_jacobian(jacobian, &local.between[b][b]) };
+            unstable |= is_unstable;
             let mut block = between * jacobian;
             if a == b {
                 let response = &local.responses[a];
@@ -429,7 +431,7 @@ fn newton_step(local: &mut LocalScratch, system: &mut System, count: usize) -> f
         local.steps[a] = step;
         longest = longest.max(step.length());
     }
-    longest
+    (longest, unstable)
 }
 
 /// Stores the responses in the contacts.

@@ -164,6 +164,7 @@ mod tests {
                 series: None,
                 pressed_surface: Some(&pressed),
                 corners: None,
+                edges: None,
                 scale: 1.0,
                 is_hyperelastic: true,
             };
