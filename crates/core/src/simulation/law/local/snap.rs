@@ -17,8 +17,9 @@ const RAISED: f64 = 0.5;
 /// Most steps of a tick, and those after which they are shortened.
 pub const MOST_SNAP_STEPS: usize = 64;
 const USUAL_STEPS: usize = 50;
-/// Longest way of a contact that snaps in a tick, over the tool's radius.
+/// Longest way of a contact that snaps in a tick: a part of the tool's radius, and a multiple of the tool's own way.
 const LONGEST_WAY: f64 = 0.02;
+const BY_TRAVEL: f64 = 2.0;
 
 /// `J` of a contact, raised where it is unstable, and whether it is.
 pub fn stable_jacobian(jacobian: DMat3, compliance: &DMat3) -> (DMat3, bool) {
@@ -47,8 +48,10 @@ pub struct Snap {
 impl Snap {
     /// At the start of a tick; a tool that snapped in the last one goes on.
     pub fn new(state: &State, slots: &[usize], radius: f64) -> Self {
-        let is_active = slots.iter().any(|&slot| state.contacts.slots[slot].local.is_snapping);
-        Self { is_active, left: LONGEST_WAY * radius, goes_on: false }
+        let contacts = slots.iter().map(|&slot| &state.contacts.slots[slot].local);
+        let is_active = contacts.clone().any(|contact| contact.is_snapping);
+        let travel = contacts.map(|contact| contact.travel).fold(0.0, f64::max);
+        Self { is_active, left: LONGEST_WAY * radius + BY_TRAVEL * travel, goes_on: false }
     }
 
     /// Most steps, and those after which they are shortened, where these are usual for others.

@@ -488,6 +488,6 @@ fn store_results(
             state.contacts.clear(slot);
         }
     }
-    update_parts(state, &local.responses, slots);
+    update_parts(model, state, &local.responses, slots);
     fade_merged_contacts(model, state, slots);
 }
