@@ -31,6 +31,7 @@ use std::f64::consts::FRAC_PI_2;
 use glam::{DMat3, DVec3};
 
 use super::SurfaceQuery;
+use super::footprint::smooth_step;
 use super::smooth::{FootPoint, SmoothSurface};
 use crate::math::{acos, hypot};
 use crate::memory::Ranges;
@@ -50,6 +51,8 @@ const SLOWED: f64 = 0.3;
 const LISTED: f64 = 1.0;
 /// Cosine of the angle between two edges that meet, from which they are pieces of one.
 const SAME_CHAIN: f64 = 0.7;
+/// Cosines between the normal of a foot and that of a face of an edge from which the edge counts, and counts fully.
+const FACING: [f64; 2] = [0.0, 0.5];
 /// Most edges beside which a sphere is at once; any others are not followed.
 const MOST_CHAINS: usize = 4;
 /// Relative difference of squared distances that counts as none.
@@ -101,10 +104,13 @@ pub struct BesideEdges {
 }
 
 /// Position across an edge: `s_k` of both faces and their gradients, and the face on which the foot lies; none on the edge itself.
+/// A foot on another edge, whose normal turns away from that face, counts in part.
 struct Across {
     places: [f64; 2],
     slopes: [DVec3; 2],
     face: Option<usize>,
+    part: f64,
+    part_slope: DVec3,
 }
 
 impl Share {
@@ -157,13 +163,14 @@ impl Edge {
         let on_edge = foot.on_crease && self.distance_squared(foot.position) < tolerance * tolerance;
         if on_edge {
             let places = self.into.map(|into| (centre - self.ends[0]).dot(into));
-            return Across { places, slopes: self.into, face: None };
+            return Across { places, slopes: self.into, face: None, part: 1.0, part_slope: DVec3::ZERO };
         }
         let face = usize::from(foot.normal.dot(self.normals[1]) > foot.normal.dot(self.normals[0]));
         let (mut places, mut slopes) = ([f64::NEG_INFINITY; 2], [DVec3::ZERO; 2]);
         places[face] = (foot.position - self.ends[0]).dot(self.into[face]);
         slopes[face] = foot.shift * self.into[face];
-        Across { places, slopes, face: Some(face) }
+        let (part, rise) = smooth_step(foot.normal.dot(self.normals[face]), FACING);
+        Across { places, slopes, face: Some(face), part, part_slope: foot.turning * self.normals[face] * rise }
     }
 
     /// `rho` for a sphere of a radius.
@@ -178,11 +185,15 @@ impl Edge {
             return Share::WHOLE;
         }
         let x = x.max(0.0);
-        let value = 1.0 - self.deficit * (1.0 - x * x * (3.0 - 2.0 * x));
-        let rate = self.deficit * 6.0 * x * (1.0 - x) / width;
-        let bend = if x > 0.0 { self.deficit * (6.0 - 12.0 * x) / (width * width) } else { 0.0 };
-        let hessian = outer(at.gradient, at.gradient) * bend + at.hessian * rate;
-        Share { value, gradient: at.gradient * rate, hessian }
+        let deficit = self.deficit * across.part;
+        let missing = 1.0 - x * x * (3.0 - 2.0 * x);
+        let rate = deficit * 6.0 * x * (1.0 - x) / width;
+        let bend = if x > 0.0 { deficit * (6.0 - 12.0 * x) / (width * width) } else { 0.0 };
+        Share {
+            value: 1.0 - deficit * missing,
+            gradient: at.gradient * rate - across.part_slope * (self.deficit * missing),
+            hessian: outer(at.gradient, at.gradient) * bend + at.hessian * rate,
+        }
     }
 
     /// Slows the foot down before the edge.
@@ -193,9 +204,13 @@ impl Edge {
             if left <= 0.0 {
                 continue;
             }
-            beside.slowed.position += into * (left * left / (4.0 * width));
-            beside.slowed.shift += outer(into, slope) * (-s.signum() * left / (2.0 * width));
-            beside.bend(into, 0.5 / width);
+            // Of `-|s|`; right on the edge the foot itself does not move.
+            let falling = if across.face.is_some() || s > 0.0 { -1.0 } else { 1.0 };
+            let moved = left * left / (4.0 * width);
+            beside.slowed.position += into * (moved * across.part);
+            beside.slowed.shift += outer(into, slope) * (across.part * falling * left / (2.0 * width));
+            beside.slowed.shift += outer(into, across.part_slope) * moved;
+            beside.bend(into, across.part * 0.5 / width);
         }
     }
 }
@@ -254,7 +269,8 @@ impl ConvexEdges {
             near = &near[count..];
             let Some(edge) = nearest else { continue };
             let across = edge.across(foot, centre, ON_EDGE * self.radius);
-            if across.face.is_some_and(|face| across.places[face] >= BESIDE[1] * self.radius) {
+            let beyond = across.face.is_some_and(|face| across.places[face] >= BESIDE[1] * self.radius);
+            if beyond || across.part == 0.0 {
                 continue;
             }
             let beside = found.get_or_insert(BesideEdges {
@@ -267,6 +283,18 @@ impl ConvexEdges {
             edge.slow(&across, SLOWED * self.radius, beside);
         }
         found
+    }
+
+    /// Whether two feet lie on both sides of one edge, or on it, within a radius.
+    pub fn are_beside_one(&self, one: &FootPoint, other: &FootPoint) -> bool {
+        let chain = |foot: &FootPoint| {
+            let [from, to] = [0, 1].map(|next| self.offsets[foot.triangle as usize + next] as usize);
+            let near = self.near[from..to].iter().map(|&edge| &self.edges[edge as usize]);
+            let distances = near.map(|edge| (edge.distance_squared(foot.position), edge.chain));
+            let nearest = distances.min_by(|one, other| one.0.total_cmp(&other.0));
+            nearest.filter(|(squared, _)| *squared < self.radius * self.radius).map(|(_, chain)| chain)
+        };
+        chain(one).is_some_and(|first| chain(other) == Some(first))
     }
 
     /// Adds the memory that a tick reads.
@@ -360,7 +388,7 @@ mod tests {
         };
         assert!(beside(DVec3::new(0.5, 0.5, 1.1)).is_none());
         for along in [0.5, 0.95] {
-            let way = |k: f64| DVec3::new(0.86 + 0.3 * k, along, 1.15 - 0.25 * k);
+            let way = |k: f64| DVec3::new(0.86 + 0.3 * k, along, 1.2 - 0.25 * k);
             let mut before: Option<BesideEdges> = None;
             for step in 0..400 {
                 let centre = way(f64::from(step) / 400.0);

@@ -35,8 +35,6 @@ pub struct LocalContact {
     pub reachable_depth: f64,
     /// Whether it fades, with its foot fixed on its plane, because the surface has no closest point there any more.
     pub is_fading: bool,
-    /// Whether it is on its way from an equilibrium that has ended to the next one.
-    pub is_snapping: bool,
     /// Its part of the half-space's stiffness, and the change of that part in a tick.
     pub part: f64,
     pub part_rate: f64,

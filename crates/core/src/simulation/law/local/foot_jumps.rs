@@ -56,8 +56,12 @@ pub fn foot_has_jumped(model: &Model, contact: &Contact, response: &LocalRespons
         return false;
     }
     let travel = place.distance(local.relative_position);
-    response.foot.position.distance(local.foot.position) > JUMP_RATIO * travel + JUMP_DISTANCE * tool.radius
-        || response.foot.normal.dot(local.foot.normal) < SAME_SIDE
+    let has_jumped = response.foot.position.distance(local.foot.position)
+        > JUMP_RATIO * travel + JUMP_DISTANCE * tool.radius
+        || response.foot.normal.dot(local.foot.normal) < SAME_SIDE;
+    // A tool that snaps over a sharp edge has gone round it.
+    let edges = model.convex_edges[contact.tool][contact.body].as_deref();
+    has_jumped && !edges.is_some_and(|edges| edges.are_beside_one(&local.foot, &response.foot))
 }
 
 /// Starts the fading of contacts whose feet have jumped, and begins their replacements. Returns whether there were any.

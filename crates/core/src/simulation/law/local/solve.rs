@@ -21,7 +21,7 @@ use super::half_space::LocalTool;
 use super::near_corner::{contact_needs_cells, evaluate};
 use super::response::{Guess, LocalResponse, OtherContacts};
 use super::scratch::{LocalScratch, TrustRegion, local_body};
-use super::snap::{MOST_SNAP_STEPS, Snap, stable_jacobian};
+use super::snap::{SNAP_STEPS, stable_jacobian};
 use super::surroundings::surroundings;
 use super::wrench::{CellMemory, placed_shape};
 use crate::contact::local::FrictionResponse;
@@ -180,8 +180,8 @@ fn solve_equations(
     let radius = if cells { tool.shape.thickness() } else { tool.radius };
     let mut trust = TrustRegion::default();
     local.has_best = false;
-    let mut snap = Snap::new(state, slots, radius);
-    for step in 0..MOST_SNAP_STEPS {
+    let mut steps = [most, USUAL_STEPS];
+    for step in 0..SNAP_STEPS[0] {
         if cells && step == most {
             break;
         }
@@ -201,21 +201,16 @@ fn solve_equations(
                 continue;
             }
         }
-        if snap.goes_on {
-            break;
-        }
         let (longest, unstable) = newton_step(local, system, slots.len(), cells);
-        snap.is_active |= unstable;
-        let [most, usual] = snap.steps([most, USUAL_STEPS]);
+        if unstable {
+            steps = SNAP_STEPS;
+        }
+        let [most, usual] = steps;
         let longest = if cells { local.lengthen_by_power_law(slots.len()) } else { longest };
         let bound = trust.longest_step.min(LONGEST_STEP * radius);
         if step >= usual || longest > bound {
             let share = (bound / longest).min(if step < usual { 1.0 } else { 0.5 });
             local.steps[..slots.len()].iter_mut().for_each(|step| *step *= share);
-        }
-        let part = snap.part(longest.min(bound));
-        if part < 1.0 {
-            local.steps[..slots.len()].iter_mut().for_each(|step| *step *= part);
         }
         // The coupling of contacts is known after the first step.
         let is_coupled = step > 0 || slots.len() == 1;
@@ -232,9 +227,6 @@ fn solve_equations(
         } else {
             break;
         }
-    }
-    for &slot in slots {
-        state.contacts.slots[slot].local.is_snapping = snap.goes_on;
     }
     if cells && trust.least_residual > LARGEST_RESIDUAL * radius { Outcome::Unsolved } else { Outcome::Converged }
 }
