@@ -16,8 +16,8 @@ RADIUS, ELEMENT, STEP = 6e-3, 6e-3, 10e-6
 DEPTHS = np.array([1e-3, 2e-3, 3e-3])
 UP = np.array([0.0, 0.0, 1.0])
 OUT = np.array([1.0, 0.0, 1.0]) / np.sqrt(2)
-# Forces up, N, of presses straight down at these distances from the edge, m, negative over the top, and of one along the
-# diagonal; as `solved_directly` finds them.
+# Forces up, N, of presses straight down at these distances from the edge, m, negative over the top, and of one along
+# the diagonal; as `solved_directly` finds them.
 DOWN = {
     -5e-3: (32.9e-3, 85.8e-3, 148.1e-3),
     -3e-3: (28.9e-3, 75.7e-3, 132.0e-3),

@@ -24,6 +24,7 @@ mod energy_surplus;
 mod foot_jumps;
 mod force_error;
 mod half_space;
+mod inclination;
 mod near_corner;
 mod near_edge;
 mod response;

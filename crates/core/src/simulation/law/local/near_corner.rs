@@ -11,7 +11,8 @@
 use glam::{DMat3, DQuat, DVec3};
 
 use super::half_space::{Indentation, LocalBody, LocalTool};
-use super::response::{Guess, LocalResponse, OtherContacts, bounded, evaluate_shape, evaluate_sphere};
+use super::inclination::OtherContacts;
+use super::response::{Guess, LocalResponse, bounded, evaluate_shape, evaluate_sphere};
 use super::wrench::CellMemory;
 use crate::contact::CornerSurface;
 use crate::contact::smooth::{FanWeights, FootPoint};

@@ -1,13 +1,12 @@
 //! A sphere beside a sharp convex edge: a softer half-space, and a compliance without a kink (`contact::ConvexEdges`).
 
-use glam::DMat3;
+use glam::{DMat3, DVec3};
 
-use super::half_space::{Fields, LocalBody};
-use super::response::{Guess, LocalResponse, OtherContacts, compliance_slope, slope};
+use super::half_space::{Fields, Indentation, LocalBody};
+use super::inclination::{OtherContacts, compliance_slope, slope};
 use crate::contact::BesideEdges;
 use crate::contact::regular::{PLANE_STRAIN, blend_fields};
 use crate::contact::smooth::{FanWeights, FootPoint};
-use crate::simulation::contacts::LocalContact;
 use crate::tensor::outer;
 
 /// Where a sphere is beside edges, and the second derivatives of `f^T C f / 2` there.
@@ -15,27 +14,26 @@ use crate::tensor::outer;
 pub struct NearEdge {
     beside: BesideEdges,
     bending: DMat3,
+    /// Derivative of the force that inclines the contact by the force.
+    pub slope_by_force: DMat3,
 }
 
 impl NearEdge {
-    /// With the weights of the slowed foot; `None` away from edges, and for a contact that fades on its plane.
+    /// For a foot, a centre and a force on the body, N, near the result. Sets the weights for the slowed foot. `None` away from edges.
     pub fn find(
         body: LocalBody<'_>,
-        contact: &LocalContact,
-        guess: Guess<'_>,
-        foot: &FootPoint,
+        (foot, centre): (&FootPoint, DVec3),
+        force: DVec3,
         weights: &mut FanWeights,
     ) -> Option<Self> {
-        let edges = body.edges.filter(|_| !contact.is_fading)?;
-        let beside = edges.beside(foot, guess.place - guess.offset)?;
+        let beside = body.edges?.beside(foot, centre)?;
         // Gradient by the foot itself.
         let fixed = FootPoint { shift: DMat3::IDENTITY, turning: DMat3::ZERO, ..beside.slowed };
         body.smooth.weigh(&fixed, weights);
-        let fields = blend_fields(weights, body.fields, false);
-        let by_foot = slope(body, guess.force, OtherContacts::default(), &fields);
-        let near = Self { beside, bending: beside.bending(by_foot) };
-        body.smooth.weigh(&near.beside.slowed, weights);
-        Some(near)
+        let by_foot = slope(body, force, OtherContacts::default(), &blend_fields(weights, body.fields, false));
+        body.smooth.weigh(&beside.slowed, weights);
+        let slope_by_force = compliance_slope(body, force, &blend_fields(weights, body.fields, false));
+        Some(Self { beside, bending: beside.bending(by_foot), slope_by_force })
     }
 
     /// Gives the half-space its share of the modulus.
@@ -44,20 +42,12 @@ impl NearEdge {
         fields.divide(PLANE_STRAIN, (1.0 / share.value, -share.gradient / (share.value * share.value)));
     }
 
-    /// Adds the derivatives of the force that come from the edges. The energy of the half-space goes with its modulus.
-    pub fn add_derivatives(
-        &self,
-        body: LocalBody<'_>,
-        guess: Guess<'_>,
-        fields: &Fields,
-        response: &mut LocalResponse,
-    ) {
-        let (share, indentation) = (&self.beside.share, &response.indentation);
-        let mixed = outer(response.foot.normal, share.gradient);
+    /// Derivative of the force on the body by the position that comes from edges, N/m. The energy of the half-space goes with its
+    /// modulus.
+    pub fn bending(&self, indentation: &Indentation, normal: DVec3) -> DMat3 {
+        let share = &self.beside.share;
+        let mixed = outer(normal, share.gradient);
         let softer = share.hessian * indentation.energy - (mixed + mixed.transpose()) * indentation.force;
-        response.bending = softer * (1.0 / share.value) - self.bending;
-        if body.series.is_none() {
-            response.slope_by_force = compliance_slope(body, guess.force, fields);
-        }
+        softer * (1.0 / share.value) - self.bending
     }
 }

@@ -3,6 +3,7 @@
 use glam::{DMat3, DVec3};
 
 use super::half_space::{Fields, HalfSpace, Indentation, LocalBody, LocalTool};
+use super::inclination::{OtherContacts, compliance_slope, slope};
 use super::near_edge::NearEdge;
 use super::wrench::{CellMemory, indent_shape, placed_shape};
 use crate::contact::footprint::PressedSurface;
@@ -10,7 +11,7 @@ use crate::contact::local::{
     Friction, FrictionResponse, HigherOrders, SERIES_FIELDS, WidenedContact, Widening, blended_series, higher_orders,
 };
 use crate::contact::regular::{
-    COMPLIANCE, GAUSS, MEAN, PLANE_STRAIN, WIDENING, WIDTH, blend_fields, compliance_of, reference_area,
+    GAUSS, MEAN, PLANE_STRAIN, WIDENING, WIDTH, blend_fields, compliance_of, reference_area,
 };
 use crate::contact::shape::ToolShape;
 use crate::contact::smooth::{Blended, FanWeights, FootPoint};
@@ -29,21 +30,6 @@ const LARGEST_CHANGE: f64 = 0.5;
 /// Change of the force from the guess, over the force, up to which higher orders follow from their derivatives at the guess. A
 /// converged change is below 1e-7.
 const CLOSE: f64 = 1e-2;
-
-/// Effect of the other contacts of the body at a contact.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct OtherContacts {
-    /// Derivative of `f^T sum_b C_ab f_b` by the position of the tool, N.
-    pub slope: DVec3,
-    /// On a body in motion: derivative by the position of the surface's displacement `u_k` less the static response to this
-    /// contact, columns by `k`. The latter's part is `f^T (dC_reg/dp') f / 2`. Taken from the displacements of nodes it would
-    /// differ by the patch's width and the modes left out, and slow closed paths near a rim would release 0.4 % of their peak
-    /// energy.
-    pub motion_slope: Option<DMat3>,
-    /// The same by the tool's rotation, N m.
-    pub turn: DVec3,
-    pub motion_turn: Option<DMat3>,
-}
 
 /// A force, the part of it by friction, N, and an offset of the tool from above its contact, m, that are close to the result.
 #[derive(Clone, Copy, Debug, Default)]
@@ -91,7 +77,7 @@ pub struct LocalResponse {
     /// Derivative of the offset by the position.
     pub offset_by_position: DMat3,
     /// Derivatives of the slope and of the offset by the force, and of the force by what it would be if neither depended on it.
-    pub slope_by_force: DMat3,
+    slope_by_force: DMat3,
     offset_by_force: DMat3,
     turning: DMat3,
     /// Where the slope is known.
@@ -137,7 +123,10 @@ pub(super) fn evaluate_sphere(
         Some(_) => foot.distance.signum() * hypot(foot.distance, guess.offset.length()),
         None => foot.distance,
     };
-    let near_edge = NearEdge::find(body, contact, guess, &foot, weights);
+    let near_edge = match contact.is_fading {
+        true => None,
+        false => NearEdge::find(body, (&foot, guess.place - guess.offset), guess.force, weights),
+    };
     if near_edge.is_none() {
         body.smooth.weigh(&foot, weights);
     }
@@ -156,7 +145,8 @@ pub(super) fn evaluate_sphere(
     *response = LocalResponse::at(body, foot, &fields, indentation);
     response.slope = slope(body, guess.force, others, &fields);
     if let Some(near_edge) = &near_edge {
-        near_edge.add_derivatives(body, guess, &fields, response);
+        response.bending = near_edge.bending(&response.indentation, response.foot.normal);
+        response.slope_by_force = near_edge.slope_by_force;
     }
     if let Some(series) = body.series {
         let (blended, known) = blended_series(series, weights);
@@ -229,23 +219,6 @@ pub(super) fn evaluate_shape(
     response.point = place + indentation.lever;
     (response.slope, response.turn) = (slope(body, force, others, &fields), compliance_turns);
     Some(())
-}
-
-/// Force on the tool from the gradients of the body's compliance and of its motion, N. It is computed from the guessed force, which
-/// agrees with the result when the steps have converged.
-pub(super) fn slope(body: LocalBody<'_>, force: DVec3, others: OtherContacts, fields: &Fields) -> DVec3 {
-    let [x, y, z] = force.to_array();
-    let products = [x * x, 2.0 * x * y, 2.0 * x * z, y * y, 2.0 * y * z, z * z];
-    let own: DVec3 = COMPLIANCE.zip(products).map(|(field, product)| fields.slope(field) * product).sum();
-    let motion_slope = others.motion_slope.map_or(DVec3::ZERO, |motion_slope| motion_slope * force);
-    own * (0.5 / body.scale) + motion_slope
-}
-
-/// Derivative of the linear part of [`slope`] by the force, columns by components of the force.
-pub(super) fn compliance_slope(body: LocalBody<'_>, force: DVec3, fields: &Fields) -> DMat3 {
-    let [xx, xy, xz, yy, yz, zz] = std::array::from_fn(|k| fields.slope(COMPLIANCE.start + k));
-    let column = |[x, y, z]: [DVec3; 3]| (x * force.x + y * force.y + z * force.z) * (1.0 / body.scale);
-    DMat3::from_cols(column([xx, xy, xz]), column([xy, yy, yz]), column([xz, yz, zz]))
 }
 
 /// Indentation by a sphere.

@@ -3,7 +3,8 @@
 use glam::{DMat3, DVec3};
 
 use super::half_space::LocalBody;
-use super::response::{LocalResponse, OtherContacts};
+use super::inclination::OtherContacts;
+use super::response::LocalResponse;
 use crate::contact::footprint::FootprintScratch;
 use crate::contact::local::cells::{CellScratch, PressureState};
 use crate::contact::smooth::{FanWeights, FootPoint, SmoothSurface};

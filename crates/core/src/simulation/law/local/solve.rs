@@ -18,8 +18,9 @@ use super::foot_jumps::{
 };
 use super::force_error::{ForceError, estimate};
 use super::half_space::LocalTool;
+use super::inclination::OtherContacts;
 use super::near_corner::{contact_needs_cells, evaluate};
-use super::response::{Guess, LocalResponse, OtherContacts};
+use super::response::{Guess, LocalResponse};
 use super::scratch::{LocalScratch, TrustRegion, local_body};
 use super::snap::{SNAP_STEPS, stable_jacobian};
 use super::surroundings::surroundings;
