@@ -25,7 +25,7 @@ CLEAR = 1e-3
 # Most that is lost over an edge or a corner of the block at these depths, as measured with a margin: it must not grow.
 # A tool deeper than about its radius snaps off.
 LOST = {
-    "sphere": (0.01, 0.82, 0.80, 0.78, 0.76, 0.75),
+    "sphere": (0.01, 0.20, 0.38, 0.82, 0.80, 0.79),
     "ellipsoid": (0.01, 0.29, 0.22, 0.45, 0.82, 0.99),
     "capsule": (0.01, 0.13, 0.58, 0.60, 0.61, 0.60),
 }
@@ -163,10 +163,7 @@ def test_a_sphere_over_a_blocks_edge_gives_back_what_was_put_in(loops, part):
 @pytest.mark.campaign(7)
 @pytest.mark.parametrize("part", DEPTHS)
 @pytest.mark.parametrize("tool", ["sphere", "ellipsoid", "capsule", "punch", "file"])
-def test_a_blocks_edge_gives_out_no_more_than_was_put_in(loops, request, tool, part):
-    if (tool, part) == ("sphere", 0.5):
-        # Over a corner 0.104 % come out, a known fault: cells there give forces that are not quite a gradient.
-        request.applymarker(pytest.mark.xfail(strict=True, reason="0.104 % in place of 0.1 %"))
+def test_a_blocks_edge_gives_out_no_more_than_was_put_in(loops, tool, part):
     rotation = LYING if tool in ("capsule", "file") else Rotation.identity()
     found = shares(loops, "block", tool, edge_paths(tool, rotation, part * RADII[tool]), rotation)
     assert max(found.values()) <= TOLERANCE, ratios(found)

@@ -4,6 +4,7 @@ mod closest;
 mod compliance;
 mod concavities;
 mod convex_corners;
+mod convex_edges;
 mod curved;
 mod face;
 pub mod footprint;
@@ -26,6 +27,7 @@ pub use closest::{SurfacePoint, SurfaceQuery};
 pub use compliance::{Touch, raise_eigenvalues, smallest_eigenvalue, touch};
 pub use concavities::Concavities;
 pub use convex_corners::CornerSurface;
+pub use convex_edges::{BesideEdges, ConvexEdges};
 pub use local::SeriesFields;
 #[cfg(feature = "offline")]
 pub use patch::wide_patch_weights;

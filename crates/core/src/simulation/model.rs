@@ -10,7 +10,7 @@ use super::tool::ToolModel;
 use super::{MAX_BODIES, MAX_TOOLS};
 use crate::contact::footprint::PressedSurface;
 use crate::contact::shape::ToolShape;
-use crate::contact::{CompliantBody, Concavities, CornerSurface, RegularCompliance};
+use crate::contact::{CompliantBody, Concavities, ConvexEdges, CornerSurface, RegularCompliance};
 use crate::memory::Ranges;
 use crate::{Error, Result};
 
@@ -29,6 +29,8 @@ pub struct Model {
     pub(super) pressed_surfaces: Vec<Vec<Option<Arc<PressedSurface>>>>,
     /// By tool and body, for spheres: the sharp convex corners of the surface, where it has any.
     pub(super) corner_surfaces: Vec<Vec<Option<Arc<CornerSurface>>>>,
+    /// Sharp convex edges, for spheres under the local law.
+    pub(super) convex_edges: Vec<Vec<Option<Arc<ConvexEdges>>>>,
     /// By tool and body, for spheres: where the tool may touch at several places.
     pub(super) concavities: Vec<Vec<Concavities>>,
 }
@@ -45,6 +47,7 @@ impl Model {
         }
         self.pressed_surfaces.iter().flatten().flatten().for_each(|surface| surface.add_memory(&mut ranges));
         self.corner_surfaces.iter().flatten().flatten().for_each(|surface| surface.add_memory(&mut ranges));
+        self.convex_edges.iter().flatten().flatten().for_each(|edges| edges.add_memory(&mut ranges));
         self.concavities.iter().flatten().for_each(|concavities| concavities.add_memory(&mut ranges));
         ranges
     }
@@ -114,8 +117,24 @@ impl Model {
             regular_compliances[rank].iter().map(Option::as_deref).zip(&bodies).map(of_body).collect()
         };
         let corner_surfaces = tools.iter().enumerate().map(corners_of_tool).collect();
+        let edges_of = |tool: &ToolModel, body: &BodyModel| match (&body.local, &tool.shape, tool.law.needs_moduli) {
+            (Some(local), &ToolShape::Sphere { radius }, true) => {
+                ConvexEdges::new((&body.loaded, &body.query, &local.smooth), radius).map(Arc::new)
+            }
+            _ => None,
+        };
+        let convex_edges = tools.iter().map(|tool| bodies.iter().map(|body| edges_of(tool, body)).collect()).collect();
         let frames = bodies.iter().map(|body| DQuat::from_mat3(&body.placement.rotation.transpose())).collect();
-        Ok(Self { bodies, tools, frames, regular_compliances, pressed_surfaces, corner_surfaces, concavities })
+        Ok(Self {
+            bodies,
+            tools,
+            frames,
+            regular_compliances,
+            pressed_surfaces,
+            corner_surfaces,
+            convex_edges,
+            concavities,
+        })
     }
 
     /// The same model where a body starts with other higher orders of its displacement: see [`BodyModel::with_series`].

@@ -56,8 +56,12 @@ pub fn foot_has_jumped(model: &Model, contact: &Contact, response: &LocalRespons
         return false;
     }
     let travel = place.distance(local.relative_position);
-    response.foot.position.distance(local.foot.position) > JUMP_RATIO * travel + JUMP_DISTANCE * tool.radius
-        || response.foot.normal.dot(local.foot.normal) < SAME_SIDE
+    let has_jumped = response.foot.position.distance(local.foot.position)
+        > JUMP_RATIO * travel + JUMP_DISTANCE * tool.radius
+        || response.foot.normal.dot(local.foot.normal) < SAME_SIDE;
+    // A tool that snaps over a sharp edge has gone round it.
+    let edges = model.convex_edges[contact.tool][contact.body].as_deref();
+    has_jumped && !edges.is_some_and(|edges| edges.are_beside_one(&local.foot, &response.foot))
 }
 
 /// Starts the fading of contacts whose feet have jumped, and begins their replacements. Returns whether there were any.
@@ -175,7 +179,7 @@ pub fn contact_depth(tool: &ToolModel, contact: &Contact, place: DVec3) -> f64 {
 /// Advances the parts of fading and growing contacts by a tick. The energy that growing contacts of a tool gain is at most that
 /// which its fading ones lose: with an energy `part * Phi` at constant positions the stationary value is concave in the part, so
 /// that a gain is at most, and a loss at least, the change of the part times `Phi`.
-pub fn update_parts(state: &mut State, responses: &[LocalResponse], slots: &[usize]) {
+pub fn update_parts(model: &Model, state: &mut State, responses: &[LocalResponse], slots: &[usize]) {
     for grows in [false, true] {
         for (a, &slot) in slots.iter().enumerate() {
             let Contact { mode, tool, local, .. } = state.contacts.slots[slot];
@@ -184,7 +188,9 @@ pub fn update_parts(state: &mut State, responses: &[LocalResponse], slots: &[usi
             }
             let whole = responses[a].indentation.energy / local.part;
             let bound = if whole > 0.0 { state.tools[tool].released_energy / whole } else { f64::INFINITY };
-            let part = (local.part + local.part_rate.min(bound)).clamp(LEAST_PART, 1.0);
+            // A contact that fades does not follow its tool far: its plane goes on where the body ends.
+            let left_behind = if local.is_fading { local.travel / model.tools[tool].radius } else { 0.0 };
+            let part = (local.part + (local.part_rate - left_behind).min(bound)).clamp(LEAST_PART, 1.0);
             state.tools[tool].released_energy += (local.part - part) * whole;
             let local = &mut state.contacts.slots[slot].local;
             local.part = part;

@@ -2,12 +2,12 @@
 
 use glam::DVec3;
 
-use crate::contact::CornerSurface;
 use crate::contact::footprint::PressedSurface;
 use crate::contact::local::{SeriesFields, StrainTerms, effective_modulus, terms_with_pad};
 use crate::contact::regular::{FanFields, PLANE_STRAIN, POISSON, STRAIN_TERMS, WIDTH};
 use crate::contact::shape::ToolShape;
 use crate::contact::smooth::{Blended, DrawnSurface, SmoothSurface};
+use crate::contact::{ConvexEdges, CornerSurface};
 
 /// Data of a body for one tool.
 #[derive(Clone, Copy)]
@@ -22,6 +22,8 @@ pub struct LocalBody<'a> {
     pub pressed_surface: Option<&'a PressedSurface>,
     /// Its sharp convex corners, for a sphere.
     pub corners: Option<&'a CornerSurface>,
+    /// Its sharp convex edges, for a sphere.
+    pub edges: Option<&'a ConvexEdges>,
     /// Young's modulus over the Green's function's.
     pub scale: f64,
     /// Whether a material at its surface has a law beyond small strain.

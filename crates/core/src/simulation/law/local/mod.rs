@@ -24,10 +24,13 @@ mod energy_surplus;
 mod foot_jumps;
 mod force_error;
 mod half_space;
+mod inclination;
 mod near_corner;
+mod near_edge;
 mod response;
 mod scratch;
 mod shape_strain;
+mod snap;
 mod solve;
 mod surroundings;
 mod wrench;
@@ -271,7 +274,7 @@ impl Law for Local {
         if approach.motion.is_none() {
             local.last_step = local.last_step.clamp_length_max(STEP_PER_MOTION * travel);
         }
-        (local.tool_position, local.orientation) = (approach.position, approach.orientation);
+        (local.tool_position, local.orientation, local.travel) = (approach.position, approach.orientation, travel);
         // After a jump a new contact starts from the depth stored in the tool's state.
         !approach.grab && !has_jumped
     }

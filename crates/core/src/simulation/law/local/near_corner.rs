@@ -11,7 +11,8 @@
 use glam::{DMat3, DQuat, DVec3};
 
 use super::half_space::{Indentation, LocalBody, LocalTool};
-use super::response::{Guess, LocalResponse, OtherContacts, bounded, evaluate_shape, evaluate_sphere};
+use super::inclination::OtherContacts;
+use super::response::{Guess, LocalResponse, bounded, evaluate_shape, evaluate_sphere};
 use super::wrench::CellMemory;
 use crate::contact::CornerSurface;
 use crate::contact::smooth::{FanWeights, FootPoint};
@@ -119,6 +120,7 @@ impl LocalResponse {
     fn mixed(&self, other: &Self, (share, gradient): (f64, DVec3), force: DVec3) -> Self {
         let softer = other.compliance - self.compliance;
         let mut mixed = *self;
+        mixed.bending = self.bending * (1.0 - share);
         mixed.foot = mixed_foot(&self.foot, &other.foot, share);
         mixed.compliance = self.compliance + softer * share;
         mixed.indentation = mixed_indentation(&self.indentation, &other.indentation, (share, gradient));

@@ -3,13 +3,15 @@
 use glam::{DMat3, DVec3};
 
 use super::half_space::{Fields, HalfSpace, Indentation, LocalBody, LocalTool};
+use super::inclination::{OtherContacts, compliance_slope, slope};
+use super::near_edge::NearEdge;
 use super::wrench::{CellMemory, indent_shape, placed_shape};
 use crate::contact::footprint::PressedSurface;
 use crate::contact::local::{
     Friction, FrictionResponse, HigherOrders, SERIES_FIELDS, WidenedContact, Widening, blended_series, higher_orders,
 };
 use crate::contact::regular::{
-    COMPLIANCE, GAUSS, MEAN, PLANE_STRAIN, WIDENING, WIDTH, blend_fields, compliance_of, reference_area,
+    GAUSS, MEAN, PLANE_STRAIN, WIDENING, WIDTH, blend_fields, compliance_of, reference_area,
 };
 use crate::contact::shape::ToolShape;
 use crate::contact::smooth::{Blended, FanWeights, FootPoint};
@@ -28,21 +30,6 @@ const LARGEST_CHANGE: f64 = 0.5;
 /// Change of the force from the guess, over the force, up to which higher orders follow from their derivatives at the guess. A
 /// converged change is below 1e-7.
 const CLOSE: f64 = 1e-2;
-
-/// Effect of the other contacts of the body at a contact.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct OtherContacts {
-    /// Derivative of `f^T sum_b C_ab f_b` by the position of the tool, N.
-    pub slope: DVec3,
-    /// On a body in motion: derivative by the position of the surface's displacement `u_k` less the static response to this
-    /// contact, columns by `k`. The latter's part is `f^T (dC_reg/dp') f / 2`. Taken from the displacements of nodes it would
-    /// differ by the patch's width and the modes left out, and slow closed paths near a rim would release 0.4 % of their peak
-    /// energy.
-    pub motion_slope: Option<DMat3>,
-    /// The same by the tool's rotation, N m.
-    pub turn: DVec3,
-    pub motion_turn: Option<DMat3>,
-}
 
 /// A force, the part of it by friction, N, and an offset of the tool from above its contact, m, that are close to the result.
 #[derive(Clone, Copy, Debug, Default)]
@@ -70,6 +57,8 @@ pub struct LocalResponse {
     /// same by the tool's rotation, N m.
     pub slope: DVec3,
     pub turn: DVec3,
+    /// Derivative of the force by the position that comes from sharp edges, N/m.
+    pub bending: DMat3,
     pub friction: FrictionResponse,
     /// Derivative of the force by friction by the position, N/m.
     pub friction_by_position: DMat3,
@@ -134,11 +123,20 @@ pub(super) fn evaluate_sphere(
         Some(_) => foot.distance.signum() * hypot(foot.distance, guess.offset.length()),
         None => foot.distance,
     };
-    body.smooth.weigh(&foot, weights);
+    let near_edge = match contact.is_fading {
+        true => None,
+        false => NearEdge::find(body, (&foot, guess.place - guess.offset), guess.force, weights),
+    };
+    if near_edge.is_none() {
+        body.smooth.weigh(&foot, weights);
+    }
     if weights.is_outside() {
         return None;
     }
-    let fields = blend_fields(weights, body.fields, body.is_hyperelastic);
+    let mut fields = blend_fields(weights, body.fields, body.is_hyperelastic);
+    if let Some(near_edge) = &near_edge {
+        near_edge.soften(&mut fields);
+    }
     // A new contact has no force: its approach counts from the present depth.
     let indentation = match contact.is_new {
         true => Indentation::default(),
@@ -146,6 +144,10 @@ pub(super) fn evaluate_sphere(
     };
     *response = LocalResponse::at(body, foot, &fields, indentation);
     response.slope = slope(body, guess.force, others, &fields);
+    if let Some(near_edge) = &near_edge {
+        response.bending = near_edge.bending(&response.indentation, response.foot.normal);
+        response.slope_by_force = near_edge.slope_by_force;
+    }
     if let Some(series) = body.series {
         let (blended, known) = blended_series(series, weights);
         (response.series, response.known) = (Some(blended), known);
@@ -219,23 +221,6 @@ pub(super) fn evaluate_shape(
     Some(())
 }
 
-/// Force on the tool from the gradients of the body's compliance and of its motion, N. It is computed from the guessed force, which
-/// agrees with the result when the steps have converged.
-fn slope(body: LocalBody<'_>, force: DVec3, others: OtherContacts, fields: &Fields) -> DVec3 {
-    let [x, y, z] = force.to_array();
-    let products = [x * x, 2.0 * x * y, 2.0 * x * z, y * y, 2.0 * y * z, z * z];
-    let own: DVec3 = COMPLIANCE.zip(products).map(|(field, product)| fields.slope(field) * product).sum();
-    let motion_slope = others.motion_slope.map_or(DVec3::ZERO, |motion_slope| motion_slope * force);
-    own * (0.5 / body.scale) + motion_slope
-}
-
-/// Derivative of the linear part of [`slope`] by the force, columns by components of the force.
-fn compliance_slope(body: LocalBody<'_>, force: DVec3, fields: &Fields) -> DMat3 {
-    let [xx, xy, xz, yy, yz, zz] = std::array::from_fn(|k| fields.slope(COMPLIANCE.start + k));
-    let column = |[x, y, z]: [DVec3; 3]| (x * force.x + y * force.y + z * force.z) * (1.0 / body.scale);
-    DMat3::from_cols(column([xx, xy, xz]), column([xy, yy, yz]), column([xz, yz, zz]))
-}
-
 /// Indentation by a sphere.
 fn indent(
     body: LocalBody<'_>,
@@ -300,6 +285,7 @@ impl LocalResponse {
             scale,
             jacobian,
             slope_by_force,
+            bending: DMat3::ZERO,
             offset_by_position: DMat3::ZERO,
             offset_by_force: DMat3::ZERO,
             friction_by_position: DMat3::ZERO,
@@ -370,6 +356,10 @@ impl LocalResponse {
         self.friction_by_position =
             self.friction.by_displacement - outer(self.friction.by_pressing, n) * indentation.stiffness;
         self.jacobian = outer(n, n) * indentation.stiffness - turning * indentation.force + self.friction_by_position;
+        self.jacobian += self.bending;
+        if self.series.is_none() && self.slope_by_force != DMat3::ZERO {
+            self.jacobian = (DMat3::IDENTITY + self.slope_by_force).inverse() * self.jacobian;
+        }
         if part > 0.0 {
             (self.offset, self.offset_by_force) = (self.offset * part, self.offset_by_force * part);
             self.jacobian = (DMat3::IDENTITY * (1.0 - part) + self.turning * part) * self.jacobian;

@@ -3,7 +3,8 @@
 use glam::{DMat3, DVec3};
 
 use super::half_space::LocalBody;
-use super::response::{LocalResponse, OtherContacts};
+use super::inclination::OtherContacts;
+use super::response::LocalResponse;
 use crate::contact::footprint::FootprintScratch;
 use crate::contact::local::cells::{CellScratch, PressureState};
 use crate::contact::smooth::{FanWeights, FootPoint, SmoothSurface};
@@ -247,6 +248,7 @@ pub fn local_body<'a>(model: &'a Model, bodies: &'a [BodyState], tool: usize, bo
         series: series.map(|series| &series.fields[..]),
         pressed_surface: model.pressed_surfaces[tool][body].as_deref(),
         corners: model.corner_surfaces[tool][body].as_deref(),
+        edges: model.convex_edges[tool][body].as_deref(),
         scale: state.stiffness_scale,
         is_hyperelastic: local.is_hyperelastic,
     })

@@ -18,9 +18,11 @@ use super::foot_jumps::{
 };
 use super::force_error::{ForceError, estimate};
 use super::half_space::LocalTool;
+use super::inclination::OtherContacts;
 use super::near_corner::{contact_needs_cells, evaluate};
-use super::response::{Guess, LocalResponse, OtherContacts};
+use super::response::{Guess, LocalResponse};
 use super::scratch::{LocalScratch, TrustRegion, local_body};
+use super::snap::{SNAP_STEPS, stable_jacobian};
 use super::surroundings::surroundings;
 use super::wrench::{CellMemory, placed_shape};
 use crate::contact::local::FrictionResponse;
@@ -179,7 +181,11 @@ fn solve_equations(
     let radius = if cells { tool.shape.thickness() } else { tool.radius };
     let mut trust = TrustRegion::default();
     local.has_best = false;
-    for step in 0..most {
+    let mut steps = [most, USUAL_STEPS];
+    for step in 0..SNAP_STEPS[0] {
+        if cells && step == most {
+            break;
+        }
         local.newton_steps = step + 1;
         if !evaluate_contacts(model, state, local, slots, body, controls, step) {
             return Outcome::ContactEnded;
@@ -196,11 +202,15 @@ fn solve_equations(
                 continue;
             }
         }
-        let longest = newton_step(local, system, slots.len());
+        let (longest, unstable) = newton_step(local, system, slots.len(), cells);
+        if unstable {
+            steps = SNAP_STEPS;
+        }
+        let [most, usual] = steps;
         let longest = if cells { local.lengthen_by_power_law(slots.len()) } else { longest };
         let bound = trust.longest_step.min(LONGEST_STEP * radius);
-        if step >= USUAL_STEPS || longest > bound {
-            let share = (bound / longest).min(if step < USUAL_STEPS { 1.0 } else { 0.5 });
+        if step >= usual || longest > bound {
+            let share = (bound / longest).min(if step < usual { 1.0 } else { 0.5 });
             local.steps[..slots.len()].iter_mut().for_each(|step| *step *= share);
         }
         // The coupling of contacts is known after the first step.
@@ -215,6 +225,8 @@ fn solve_equations(
             local.take_step(slots.len());
         } else if !cells && longest > DIVERGED_STEP * radius {
             return Outcome::Diverged;
+        } else {
+            break;
         }
     }
     if cells && trust.least_residual > LARGEST_RESIDUAL * radius { Outcome::Unsolved } else { Outcome::Converged }
@@ -376,18 +388,24 @@ fn evaluate_contacts(
     true
 }
 
-/// One step of Newton's method; returns the longest over the contacts, m.
-fn newton_step(local: &mut LocalScratch, system: &mut System, count: usize) -> f64 {
+/// One step of Newton's method; returns the longest over the contacts, m, and whether one of them is unstable. Steps with pressure
+/// cells are bounded by their residuals instead.
+fn newton_step(local: &mut LocalScratch, system: &mut System, count: usize, cells: bool) -> (f64, bool) {
+    let mut unstable = false;
     for a in 0..count {
         let mut residual = local.positions[a] - local.free_positions[a];
         for b in 0..count {
             let between = local.between[a][b];
             residual += between * local.responses[b].force;
-            let mut block = between * local.responses[b].jacobian;
+            let jacobian = local.responses[b].jacobian;
+            let (jacobian, is_unstable) =
+                if cells { (jacobian, false) } else { stable_jacobian(jacobian, &local.between[b][b]) };
+            unstable |= is_unstable;
+            let mut block = between * jacobian;
             if a == b {
                 let response = &local.responses[a];
                 residual += response.higher.displacement;
-                block += DMat3::IDENTITY + response.higher.compliance * response.jacobian;
+                block += DMat3::IDENTITY + response.higher.compliance * jacobian;
                 block += response.displacement_by_position();
             }
             for row in 0..3 {
@@ -406,7 +424,7 @@ fn newton_step(local: &mut LocalScratch, system: &mut System, count: usize) -> f
         local.steps[a] = step;
         longest = longest.max(step.length());
     }
-    longest
+    (longest, unstable)
 }
 
 /// Stores the responses in the contacts.
@@ -463,6 +481,6 @@ fn store_results(
             state.contacts.clear(slot);
         }
     }
-    update_parts(state, &local.responses, slots);
+    update_parts(model, state, &local.responses, slots);
     fade_merged_contacts(model, state, slots);
 }

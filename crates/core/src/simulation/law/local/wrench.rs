@@ -127,8 +127,9 @@ mod tests {
     use crate::contact::smooth::{DrawnSurface, FanWeights, SmoothSurface};
     use crate::mesh::Surface;
     use crate::simulation::law::local::half_space::LocalBody;
+    use crate::simulation::law::local::inclination::OtherContacts;
     use crate::simulation::law::local::near_corner::evaluate;
-    use crate::simulation::law::local::response::{Guess, LocalResponse, OtherContacts};
+    use crate::simulation::law::local::response::{Guess, LocalResponse};
 
     /// A body whose modulus rises by a half over a length of two.
     struct Body {
@@ -164,6 +165,7 @@ mod tests {
                 series: None,
                 pressed_surface: Some(&pressed),
                 corners: None,
+                edges: None,
                 scale: 1.0,
                 is_hyperelastic: true,
             };

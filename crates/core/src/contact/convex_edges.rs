@@ -1,0 +1,436 @@
+//! Sharp convex edges of a surface, beside which a sphere presses less than a half-space.
+//!
+//! Two functions of the sphere's centre `p`, by its position in the plane across the edge. With the unit vectors `n_k` from the edge
+//! into its two faces, `s_k` is the distance of the closest point from the edge in face `k`, and negative, `n_k . (p - x)`, where the
+//! closest point `x` lies on the edge.
+//!
+//! *The half-space.* The material beyond the edge is missing. Direct solutions for a sphere of 6 mm beside edges of 60, 90 and 120
+//! degrees (`edge_block` of the tests) give 0.36, 0.58 and 0.73 of Hertz's force for shallow presses right on the edge, and less
+//! beyond it. So its modulus has the share
+//!
+//! ```text
+//! rho = 1 - m (1 - L) (1 - step((t/R - B_0) / (B_1 - B_0)))        step(x) = x^2 (3 - 2 x)
+//! t = s_k on face k        t = -s_1 s_2 / sqrt(s_1^2 + s_2^2) over the edge
+//! ```
+//!
+//! with `m` by the angle between the faces' normals. `t` and its derivative are continuous: over the edge `s_2` is negative where
+//! `s_1` passes zero. Shares of several edges multiply.
+//!
+//! *The body.* The closest point stops at the edge, and the gradient of the compliance `C(x)`, which inclines the force, would end
+//! there at once. So the compliance is taken at a point that slows down before the edge,
+//!
+//! ```text
+//! x + sum_k n_k (w - |s_k|)^2 / (4 w)        for |s_k| < w
+//! ```
+//!
+//! Both are functions of `p` alone, so that the force is the gradient of one energy as before.
+
+use std::collections::BTreeSet;
+use std::f64::consts::FRAC_PI_2;
+
+use glam::{DMat3, DVec3};
+
+use super::SurfaceQuery;
+use super::footprint::smooth_step;
+use super::smooth::{FootPoint, SmoothSurface};
+use crate::math::{acos, hypot};
+use crate::memory::Ranges;
+use crate::mesh::Surface;
+use crate::tensor::outer;
+
+/// `L`, and `B_0`, `B_1`.
+const LEAST_SHARE: f64 = 0.35;
+const BESIDE: [f64; 2] = [-0.5, 0.667];
+/// `m = q (M_0 + M_1 q)` with the turn `q` of the normal over a right angle, and its largest value: acute edges are blades, whose
+/// bending the body's compliance has.
+const BY_TURN: [f64; 2] = [0.8, 0.2];
+const MOST_BY_TURN: f64 = 1.4;
+/// `w` over the sphere's radius.
+const SLOWED: f64 = 0.3;
+/// Edges up to this distance from a triangle, over the radius, are listed for it.
+const LISTED: f64 = 1.0;
+/// Cosine of the angle between two edges that meet, from which they are pieces of one.
+const SAME_CHAIN: f64 = 0.7;
+/// Cosines between the normal of a foot and that of a face of an edge from which the edge counts, and counts fully.
+const FACING: [f64; 2] = [0.0, 0.5];
+/// Most edges beside which a sphere is at once; any others are not followed.
+const MOST_CHAINS: usize = 4;
+/// Relative difference of squared distances that counts as none.
+const SAME_DISTANCE: f64 = 1e-9;
+/// Distance of a foot from an edge on which it lies, over the radius.
+const ON_EDGE: f64 = 1e-6;
+
+/// A piece of a sharp convex edge.
+#[derive(Clone, Copy, Debug)]
+struct Edge {
+    ends: [DVec3; 2],
+    along: DVec3,
+    /// Unit vectors from the edge into both faces, and the normals of these.
+    into: [DVec3; 2],
+    normals: [DVec3; 2],
+    /// `m (1 - L)`.
+    deficit: f64,
+    /// Rank of the edge of which it is a piece.
+    chain: u32,
+}
+
+/// Sharp convex edges of a surface, for a sphere.
+pub struct ConvexEdges {
+    edges: Vec<Edge>,
+    /// For each drawn triangle the start of its edges in `near`; one more for the end. Pieces of one edge follow each other.
+    offsets: Vec<u32>,
+    near: Vec<u32>,
+    radius: f64,
+}
+
+/// A function of the sphere's centre, its gradient, and its second derivatives.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Share {
+    pub value: f64,
+    pub gradient: DVec3,
+    pub hessian: DMat3,
+}
+
+/// A sphere beside sharp edges.
+#[derive(Clone, Copy, Debug)]
+pub struct BesideEdges {
+    /// Share of the half-space's modulus.
+    pub share: Share,
+    /// The foot at which the body's compliance is taken.
+    pub slowed: FootPoint,
+    /// Directions in which that foot's derivative changes with the centre, and how fast, 1/m.
+    bends: [(DVec3, f64); 2 * MOST_CHAINS],
+    bend_count: usize,
+}
+
+/// Position across an edge: `s_k` of both faces and their gradients, and the face on which the foot lies; none on the edge itself.
+/// A foot on another edge, whose normal turns away from that face, counts in part.
+struct Across {
+    places: [f64; 2],
+    slopes: [DVec3; 2],
+    face: Option<usize>,
+    part: f64,
+    part_slope: DVec3,
+}
+
+impl Share {
+    const WHOLE: Self = Self { value: 1.0, gradient: DVec3::ZERO, hessian: DMat3::ZERO };
+
+    /// The product of two functions.
+    fn times(&self, other: &Self) -> Self {
+        let mixed = outer(self.gradient, other.gradient);
+        Self {
+            value: self.value * other.value,
+            gradient: self.gradient * other.value + other.gradient * self.value,
+            hessian: self.hessian * other.value + other.hessian * self.value + mixed + mixed.transpose(),
+        }
+    }
+}
+
+impl BesideEdges {
+    /// Adds a direction.
+    fn bend(&mut self, direction: DVec3, rate: f64) {
+        if let Some(place) = self.bends.get_mut(self.bend_count) {
+            *place = (direction, rate);
+            self.bend_count += 1;
+        }
+    }
+
+    /// Second derivatives by the centre of a function of the slowed foot with a gradient, as far as they come from the foot's own.
+    pub fn bending(&self, gradient: DVec3) -> DMat3 {
+        let bends = self.bends[..self.bend_count].iter();
+        bends.map(|&(n, rate)| outer(n, n) * (rate * gradient.dot(n))).sum()
+    }
+}
+
+impl Edge {
+    /// Squared distance of a point, m^2.
+    fn distance_squared(&self, point: DVec3) -> f64 {
+        let length = self.ends[0].distance(self.ends[1]);
+        let at = (point - self.ends[0]).dot(self.along).clamp(0.0, length);
+        point.distance_squared(self.ends[0] + self.along * at)
+    }
+
+    /// Squared distance of a foot, m^2, by which the piece of an edge is chosen. Around the common end of two pieces it is the same for
+    /// both: there the one farther from the centre counts, so that the position across the edge is continuous.
+    fn remoteness(&self, foot: DVec3, centre: DVec3) -> f64 {
+        let off = (centre - self.ends[0]).reject_from_normalized(self.along);
+        self.distance_squared(foot) - SAME_DISTANCE * off.length_squared()
+    }
+
+    /// Position of a sphere's centre with a foot across the edge.
+    fn across(&self, foot: &FootPoint, centre: DVec3, tolerance: f64) -> Across {
+        let on_edge = foot.on_crease && self.distance_squared(foot.position) < tolerance * tolerance;
+        if on_edge {
+            let places = self.into.map(|into| (centre - self.ends[0]).dot(into));
+            return Across { places, slopes: self.into, face: None, part: 1.0, part_slope: DVec3::ZERO };
+        }
+        let face = usize::from(foot.normal.dot(self.normals[1]) > foot.normal.dot(self.normals[0]));
+        let (mut places, mut slopes) = ([f64::NEG_INFINITY; 2], [DVec3::ZERO; 2]);
+        places[face] = (foot.position - self.ends[0]).dot(self.into[face]);
+        slopes[face] = foot.shift * self.into[face];
+        let (part, rise) = smooth_step(foot.normal.dot(self.normals[face]), FACING);
+        Across { places, slopes, face: Some(face), part, part_slope: foot.turning * self.normals[face] * rise }
+    }
+
+    /// `rho` for a sphere of a radius.
+    fn share(&self, across: &Across, radius: f64) -> Share {
+        let at = match across.face {
+            Some(face) => Share { value: across.places[face], gradient: across.slopes[face], hessian: DMat3::ZERO },
+            None => over_edge(across),
+        };
+        let width = (BESIDE[1] - BESIDE[0]) * radius;
+        let x = (at.value / radius - BESIDE[0]) / (BESIDE[1] - BESIDE[0]);
+        if x >= 1.0 {
+            return Share::WHOLE;
+        }
+        let x = x.max(0.0);
+        let deficit = self.deficit * across.part;
+        let missing = 1.0 - x * x * (3.0 - 2.0 * x);
+        let rate = deficit * 6.0 * x * (1.0 - x) / width;
+        let bend = if x > 0.0 { deficit * (6.0 - 12.0 * x) / (width * width) } else { 0.0 };
+        Share {
+            value: 1.0 - deficit * missing,
+            gradient: at.gradient * rate - across.part_slope * (self.deficit * missing),
+            hessian: outer(at.gradient, at.gradient) * bend + at.hessian * rate,
+        }
+    }
+
+    /// Slows the foot down before the edge.
+    fn slow(&self, across: &Across, width: f64, beside: &mut BesideEdges) {
+        for k in (0..2).filter(|&k| across.face.is_none_or(|face| face == k)) {
+            let (s, slope, into) = (across.places[k], across.slopes[k], self.into[k]);
+            let left = width - s.abs();
+            if left <= 0.0 {
+                continue;
+            }
+            // Of `-|s|`; right on the edge the foot itself does not move.
+            let falling = if across.face.is_some() || s > 0.0 { -1.0 } else { 1.0 };
+            let moved = left * left / (4.0 * width);
+            beside.slowed.position += into * (moved * across.part);
+            beside.slowed.shift += outer(into, slope) * (across.part * falling * left / (2.0 * width));
+            beside.slowed.shift += outer(into, across.part_slope) * moved;
+            beside.bend(into, across.part * 0.5 / width);
+        }
+    }
+}
+
+/// `-s_1 s_2 / sqrt(s_1^2 + s_2^2)`.
+fn over_edge(across: &Across) -> Share {
+    let ([x, y], [n, m]) = (across.places, across.slopes);
+    let size = hypot(x, y).max(f64::MIN_POSITIVE);
+    let (x, y) = (x.min(0.0) / size, y.min(0.0) / size);
+    let mixed = outer(n, m);
+    Share {
+        value: -x * y * size,
+        gradient: -(n * (y * y * y) + m * (x * x * x)),
+        hessian: (outer(n, n) * (x * y * y * y) + outer(m, m) * (x * x * x * y)
+            - (mixed + mixed.transpose()) * (x * x * y * y))
+            * (3.0 / size),
+    }
+}
+
+impl ConvexEdges {
+    /// For a sphere of `radius`, m; `None` for a surface without such edges.
+    pub fn new((surface, query, smooth): (&Surface, &SurfaceQuery, &SmoothSurface), radius: f64) -> Option<Self> {
+        let edges = convex_edges(surface, smooth);
+        if edges.is_empty() {
+            return None;
+        }
+        let mut lists = vec![BTreeSet::new(); surface.triangles.len()];
+        let reach = DVec3::splat(LISTED * radius);
+        for (rank, edge) in edges.iter().enumerate() {
+            let [first, second] = edge.ends;
+            query.for_each_within(first.min(second) - reach, first.max(second) + reach, |triangle| {
+                lists[triangle as usize].insert(rank as u32);
+            });
+        }
+        let mut offsets = vec![0];
+        let mut near = Vec::new();
+        for list in lists {
+            near.extend(list);
+            offsets.push(near.len() as u32);
+        }
+        Some(Self { edges, offsets, near, radius })
+    }
+
+    /// Where a sphere with its centre and foot there is beside sharp edges; `None` elsewhere.
+    pub fn beside(&self, foot: &FootPoint, centre: DVec3) -> Option<BesideEdges> {
+        let [from, to] = [0, 1].map(|next| self.offsets[foot.triangle as usize + next] as usize);
+        let (mut near, mut found) = (&self.near[from..to], None);
+        while let Some(&first) = near.first() {
+            let chain = self.edges[first as usize].chain;
+            let count = near.iter().take_while(|&&edge| self.edges[edge as usize].chain == chain).count();
+            let pieces = near[..count].iter().map(|&edge| &self.edges[edge as usize]);
+            let nearest = pieces.min_by(|one, other| {
+                let [one, other] = [one, other].map(|edge| edge.remoteness(foot.position, centre));
+                one.total_cmp(&other)
+            });
+            near = &near[count..];
+            let Some(edge) = nearest else { continue };
+            let across = edge.across(foot, centre, ON_EDGE * self.radius);
+            let beyond = across.face.is_some_and(|face| across.places[face] >= BESIDE[1] * self.radius);
+            if beyond || across.part == 0.0 {
+                continue;
+            }
+            let beside = found.get_or_insert(BesideEdges {
+                share: Share::WHOLE,
+                slowed: *foot,
+                bends: Default::default(),
+                bend_count: 0,
+            });
+            beside.share = beside.share.times(&edge.share(&across, self.radius));
+            edge.slow(&across, SLOWED * self.radius, beside);
+        }
+        found
+    }
+
+    /// Whether two feet lie on both sides of one edge, or on it, within a radius.
+    pub fn are_beside_one(&self, one: &FootPoint, other: &FootPoint) -> bool {
+        let chain = |foot: &FootPoint| {
+            let [from, to] = [0, 1].map(|next| self.offsets[foot.triangle as usize + next] as usize);
+            let near = self.near[from..to].iter().map(|&edge| &self.edges[edge as usize]);
+            let distances = near.map(|edge| (edge.distance_squared(foot.position), edge.chain));
+            let nearest = distances.min_by(|one, other| one.0.total_cmp(&other.0));
+            nearest.filter(|(squared, _)| *squared < self.radius * self.radius).map(|(_, chain)| chain)
+        };
+        chain(one).is_some_and(|first| chain(other) == Some(first))
+    }
+
+    /// Adds the memory that a tick reads.
+    pub(crate) fn add_memory(&self, ranges: &mut Ranges) {
+        ranges.add(&self.edges);
+        ranges.add(&self.offsets);
+        ranges.add(&self.near);
+    }
+}
+
+/// Creases whose faces turn away from each other, sorted by chain.
+fn convex_edges(surface: &Surface, smooth: &SmoothSurface) -> Vec<Edge> {
+    let (mut edges, mut nodes) = (Vec::new(), Vec::new());
+    for (t, across) in surface.neighbours.iter().enumerate() {
+        let (ends, creases) = (surface.corners(t as u32), smooth.creases_of(t as u32));
+        for k in (0..3).filter(|&k| creases[k] && across[k] != u32::MAX && across[k] as usize > t) {
+            let next = (k + 1) % 3;
+            let normals = [t, across[k] as usize].map(|t| surface.normals[t]);
+            let along = (ends[next] - ends[k]).normalize_or_zero();
+            if normals[0].cross(normals[1]).dot(along) > 0.0 {
+                let turn = acos(normals[0].dot(normals[1]).clamp(-1.0, 1.0)) / FRAC_PI_2;
+                let by_turn = (turn * (BY_TURN[0] + BY_TURN[1] * turn)).min(MOST_BY_TURN);
+                edges.push(Edge {
+                    ends: [ends[k], ends[next]],
+                    along,
+                    into: [normals[0].cross(along), along.cross(normals[1])],
+                    normals,
+                    deficit: by_turn * (1.0 - LEAST_SHARE),
+                    chain: u32::MAX,
+                });
+                nodes.push([surface.triangles[t][k], surface.triangles[t][next]]);
+            }
+        }
+    }
+    number_chains(&mut edges, &nodes);
+    edges.sort_by_key(|edge| edge.chain);
+    edges
+}
+
+/// Numbers the chains of pieces that go on in about the same direction.
+fn number_chains(edges: &mut [Edge], nodes: &[[u32; 2]]) {
+    let mut at_node: std::collections::BTreeMap<u32, Vec<usize>> = Default::default();
+    for (edge, ends) in nodes.iter().enumerate() {
+        ends.iter().for_each(|&node| at_node.entry(node).or_default().push(edge));
+    }
+    let mut chains = 0;
+    for first in 0..edges.len() {
+        if edges[first].chain != u32::MAX {
+            continue;
+        }
+        edges[first].chain = chains;
+        let mut open = vec![first];
+        while let Some(edge) = open.pop() {
+            for &other in nodes[edge].iter().flat_map(|node| &at_node[node]) {
+                let straight = edges[edge].along.dot(edges[other].along).abs() > SAME_CHAIN;
+                if edges[other].chain == u32::MAX && straight {
+                    edges[other].chain = chains;
+                    open.push(other);
+                }
+            }
+        }
+        chains += 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::smooth::DrawnSurface;
+    use crate::contact::smooth::tests::{ball, cube, near};
+
+    #[test]
+    fn a_ball_has_no_edges_and_a_cube_has_twelve() {
+        let of = |surface: &Surface| convex_edges(surface, &SmoothSurface::new(surface));
+        assert!(of(&ball(24)).is_empty());
+        let edges = of(&cube());
+        assert_eq!(edges.iter().map(|edge| edge.chain).collect::<BTreeSet<_>>().len(), 12);
+        assert!(edges.iter().all(|edge| (edge.deficit - (1.0 - LEAST_SHARE)).abs() < 1e-12));
+    }
+
+    /// Along a way from the top over an edge to the side, and near a corner.
+    #[test]
+    fn shares_and_feet_have_continuous_derivatives() {
+        let (surface, radius) = (cube(), 0.2);
+        let (smooth, query) = (SmoothSurface::new(&surface), SurfaceQuery::new(&surface).expect("triangles"));
+        let edges = ConvexEdges::new((&surface, &query, &smooth), radius).expect("edges");
+        let (drawn, mut near) = (DrawnSurface { surface: &surface, query: &query }, near(&smooth));
+        let mut beside = |centre: DVec3| {
+            let foot = smooth.foot_anywhere(drawn, centre, &mut near).expect("a foot");
+            edges.beside(&foot, centre)
+        };
+        assert!(beside(DVec3::new(0.5, 0.5, 1.1)).is_none());
+        for along in [0.5, 0.95] {
+            let way = |k: f64| DVec3::new(0.86 + 0.3 * k, along, 1.2 - 0.25 * k);
+            let mut before: Option<BesideEdges> = None;
+            for step in 0..400 {
+                let centre = way(f64::from(step) / 400.0);
+                let Some(at) = beside(centre) else { continue };
+                assert!(at.share.value > 0.0 && at.share.value <= 1.0);
+                let h = 1e-6;
+                for axis in DVec3::AXES {
+                    let [ahead, behind] = [h, -h].map(|h| beside(centre + h * axis).expect("beside an edge"));
+                    let slope = (ahead.share.value - behind.share.value) / (2.0 * h);
+                    assert!((slope - at.share.gradient.dot(axis)).abs() < 1e-3 / radius, "{centre}");
+                    let moved = (ahead.slowed.position - behind.slowed.position) / (2.0 * h);
+                    assert!(
+                        (moved - at.slowed.shift * axis).length() < 1e-3,
+                        "{centre} {moved} {}",
+                        at.slowed.shift * axis
+                    );
+                }
+                if let Some(before) = before {
+                    assert!(before.share.gradient.distance(at.share.gradient) < 0.3 / radius, "{centre}");
+                }
+                before = Some(at);
+            }
+            assert!(before.is_some());
+        }
+    }
+
+    #[test]
+    fn second_derivatives_are_those_of_the_share() {
+        let (surface, radius) = (cube(), 0.2);
+        let (smooth, query) = (SmoothSurface::new(&surface), SurfaceQuery::new(&surface).expect("triangles"));
+        let edges = ConvexEdges::new((&surface, &query, &smooth), radius).expect("edges");
+        let (drawn, mut near) = (DrawnSurface { surface: &surface, query: &query }, near(&smooth));
+        let mut share = |centre: DVec3| {
+            let foot = smooth.foot_anywhere(drawn, centre, &mut near).expect("a foot");
+            edges.beside(&foot, centre).expect("beside an edge").share
+        };
+        for centre in [DVec3::new(0.95, 0.5, 1.1), DVec3::new(1.06, 0.5, 1.09), DVec3::new(0.96, 0.95, 1.1)] {
+            let h = 1e-6;
+            for axis in DVec3::AXES {
+                let bent = (share(centre + h * axis).gradient - share(centre - h * axis).gradient) / (2.0 * h);
+                assert!((bent - share(centre).hessian * axis).length() < 1e-5 / radius.powi(2), "{centre}");
+            }
+        }
+    }
+}
