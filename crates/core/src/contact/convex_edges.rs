@@ -41,9 +41,10 @@ use crate::tensor::outer;
 /// `L`, and `B_0`, `B_1`.
 const LEAST_SHARE: f64 = 0.35;
 const BESIDE: [f64; 2] = [-0.5, 0.667];
-/// `m = q (M_0 + M_1 q)` with the turn `q` of the normal over a right angle, and its largest value: acute edges are blades, whose
-/// bending the body's compliance has.
+/// `m = q (M_0 + M_1 q)` with the turn `q` of the normal over a right angle, and its largest value.
 const BY_TURN: [f64; 2] = [0.8, 0.2];
+/// Turn of the normal over a right angle beyond which an edge is a blade, which bends as a whole.
+const BLADE: f64 = 1.5;
 const MOST_BY_TURN: f64 = 1.0;
 /// `w` over the sphere's radius.
 const SLOWED: f64 = 0.3;
@@ -319,6 +320,9 @@ fn convex_edges(surface: &Surface, smooth: &SmoothSurface) -> Vec<Edge> {
             let along = (ends[next] - ends[k]).normalize_or_zero();
             if normals[0].cross(normals[1]).dot(along) > 0.0 {
                 let turn = acos(normals[0].dot(normals[1]).clamp(-1.0, 1.0)) / FRAC_PI_2;
+                if turn > BLADE {
+                    continue;
+                }
                 let by_turn = (turn * (BY_TURN[0] + BY_TURN[1] * turn)).min(MOST_BY_TURN);
                 edges.push(Edge {
                     ends: [ends[k], ends[next]],
