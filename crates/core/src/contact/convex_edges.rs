@@ -41,10 +41,11 @@ use crate::tensor::outer;
 /// `L`, and `B_0`, `B_1`.
 const LEAST_SHARE: f64 = 0.35;
 const BESIDE: [f64; 2] = [-0.5, 0.667];
-/// `m = q (M_0 + M_1 q)` with the turn `q` of the normal over a right angle, and its largest value: acute edges are blades, whose
-/// bending the body's compliance has.
+/// `m = q (M_0 + M_1 q)` with the turn `q` of the normal over a right angle, and its largest value.
 const BY_TURN: [f64; 2] = [0.8, 0.2];
-const MOST_BY_TURN: f64 = 1.4;
+/// Turn of the normal over a right angle beyond which an edge is a blade, which bends as a whole.
+const BLADE: f64 = 1.5;
+const MOST_BY_TURN: f64 = 1.0;
 /// `w` over the sphere's radius.
 const SLOWED: f64 = 0.3;
 /// Edges up to this distance from a triangle, over the radius, are listed for it.
@@ -53,6 +54,8 @@ const LISTED: f64 = 1.0;
 const SAME_CHAIN: f64 = 0.7;
 /// Cosines between the normal of a foot and that of a face of an edge from which the edge counts, and counts fully.
 const FACING: [f64; 2] = [0.0, 0.5];
+/// Distance of another edge in about the same direction, over the radius, from which an edge counts.
+const ALONE: f64 = 2.0;
 /// Most edges beside which a sphere is at once; any others are not followed.
 const MOST_CHAINS: usize = 4;
 /// Relative difference of squared distances that counts as none.
@@ -233,7 +236,8 @@ fn over_edge(across: &Across) -> Share {
 impl ConvexEdges {
     /// For a sphere of `radius`, m; `None` for a surface without such edges.
     pub fn new((surface, query, smooth): (&Surface, &SurfaceQuery, &SmoothSurface), radius: f64) -> Option<Self> {
-        let edges = convex_edges(surface, smooth);
+        let mut edges = convex_edges(surface, smooth);
+        keep_single(&mut edges, ALONE * radius);
         if edges.is_empty() {
             return None;
         }
@@ -316,6 +320,9 @@ fn convex_edges(surface: &Surface, smooth: &SmoothSurface) -> Vec<Edge> {
             let along = (ends[next] - ends[k]).normalize_or_zero();
             if normals[0].cross(normals[1]).dot(along) > 0.0 {
                 let turn = acos(normals[0].dot(normals[1]).clamp(-1.0, 1.0)) / FRAC_PI_2;
+                if turn > BLADE {
+                    continue;
+                }
                 let by_turn = (turn * (BY_TURN[0] + BY_TURN[1] * turn)).min(MOST_BY_TURN);
                 edges.push(Edge {
                     ends: [ends[k], ends[next]],
@@ -332,6 +339,28 @@ fn convex_edges(surface: &Surface, smooth: &SmoothSurface) -> Vec<Edge> {
     number_chains(&mut edges, &nodes);
     edges.sort_by_key(|edge| edge.chain);
     edges
+}
+
+/// Keeps edges without another one beside them: between two edges the body is a bar or a rim, not a wedge.
+fn keep_single(edges: &mut Vec<Edge>, distance: f64) {
+    use std::collections::BTreeMap;
+    let middle = |edge: &Edge| (edge.ends[0] + edge.ends[1]) * 0.5;
+    // Pieces by cubes of a size that holds each and its surroundings.
+    let longest = edges.iter().map(|edge| edge.ends[0].distance(edge.ends[1])).fold(distance, f64::max);
+    let cube = |at: DVec3| (at / longest).floor().to_array().map(|place| place as i64);
+    let mut cubes: BTreeMap<[i64; 3], Vec<Edge>> = BTreeMap::new();
+    edges.iter().for_each(|edge| cubes.entry(cube(middle(edge))).or_default().push(*edge));
+    let is_beside = |edge: &Edge, other: &Edge| {
+        let near = |point: &DVec3| other.distance_squared(*point) < distance * distance;
+        other.chain != edge.chain
+            && other.along.dot(edge.along).abs() > SAME_CHAIN
+            && (edge.ends.iter().any(near) || near(&middle(edge)))
+    };
+    edges.retain(|edge| {
+        let [x, y, z] = cube(middle(edge));
+        let around = (0..125).map(|k| [x + k % 5 - 2, y + k / 5 % 5 - 2, z + k / 25 - 2]);
+        !around.filter_map(|place| cubes.get(&place)).flatten().any(|other| is_beside(edge, other))
+    });
 }
 
 /// Numbers the chains of pieces that go on in about the same direction.

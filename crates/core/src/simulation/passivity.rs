@@ -17,7 +17,7 @@ use super::MAX_CONTACTS;
 use super::rotation::rotation_vector;
 
 /// Tolerated surplus over the largest stored energy, and the surplus to which a larger one is reduced.
-const TOLERANCE: f64 = 4.6e-4;
+const TOLERANCE: f64 = 7e-4;
 const TARGET: f64 = 0.9 * TOLERANCE;
 /// A surplus below the first part of the largest energy reduces the approach by no more than the second part in a tick: a larger
 /// reduction could be felt as a jump.
