@@ -26,7 +26,7 @@ CLEAR = 1e-3
 # A tool deeper than about its radius snaps off.
 LOST = {
     "sphere": (0.01, 0.20, 0.38, 0.82, 0.80, 0.79),
-    "ellipsoid": (0.01, 0.29, 0.22, 0.45, 0.82, 0.99),
+    "ellipsoid": (0.01, 0.29, 0.22, 0.45, 0.82, 1.01),
     "capsule": (0.01, 0.13, 0.58, 0.60, 0.61, 0.60),
 }
 
