@@ -8,13 +8,11 @@
 //! Along edges between corners a sphere has the closed form: cells that pass over an edge give energies whose differences are
 //! forces to 15 % only, so that closed paths over a thin rim would gain energy.
 
-use std::collections::BTreeSet;
-
 use glam::DVec3;
 
-use super::SurfaceQuery;
 use super::footprint::{PressedSurface, smooth_step};
 use super::smooth::SmoothSurface;
+use super::{SurfaceQuery, TriangleLists};
 use crate::memory::Ranges;
 use crate::mesh::Surface;
 
@@ -33,9 +31,8 @@ pub struct CornerSurface {
     pub pressed: PressedSurface,
     /// Positions of the corners, m.
     corners: Vec<DVec3>,
-    /// For each drawn triangle the start of its corners in `near`; one more for the end.
-    offsets: Vec<u32>,
-    near: Vec<u32>,
+    /// Those near each drawn triangle.
+    near: TriangleLists,
     radius: f64,
 }
 
@@ -50,26 +47,14 @@ impl CornerSurface {
         if corners.is_empty() {
             return None;
         }
-        let mut lists = vec![BTreeSet::new(); surface.triangles.len()];
         let reach = DVec3::splat(LISTED * radius);
-        for (rank, &corner) in corners.iter().enumerate() {
-            query.for_each_within(corner - reach, corner + reach, |triangle| {
-                lists[triangle as usize].insert(rank as u32);
-            });
-        }
-        let mut offsets = vec![0];
-        let mut near = Vec::new();
-        for list in lists {
-            near.extend(list);
-            offsets.push(near.len() as u32);
-        }
-        Some(Self { pressed: pressed(), corners, offsets, near, radius })
+        let near = TriangleLists::new(surface, query, corners.iter().map(|&corner| [corner - reach, corner + reach]));
+        Some(Self { pressed: pressed(), corners, near, radius })
     }
 
     /// Share of cells in the contact of a sphere at a position near a triangle, and its gradient, 1/m.
     pub fn share(&self, triangle: u32, position: DVec3) -> (f64, DVec3) {
-        let [from, to] = [0, 1].map(|next| self.offsets[triangle as usize + next] as usize);
-        let offsets = self.near[from..to].iter().map(|&corner| position - self.corners[corner as usize]);
+        let offsets = self.near.at(triangle).iter().map(|&corner| position - self.corners[corner as usize]);
         let Some(nearest) = offsets.min_by(|a, b| a.length_squared().total_cmp(&b.length_squared())) else {
             return (0.0, DVec3::ZERO);
         };
@@ -82,25 +67,15 @@ impl CornerSurface {
     pub(crate) fn add_memory(&self, ranges: &mut Ranges) {
         self.pressed.add_memory(ranges);
         ranges.add(&self.corners);
-        ranges.add(&self.offsets);
-        ranges.add(&self.near);
+        self.near.add_memory(ranges);
     }
 }
 
 /// Positions of the nodes in which several creases meet whose faces turn away from each other, m.
 fn convex_corners(surface: &Surface, smooth: &SmoothSurface) -> Vec<DVec3> {
     let mut counts = vec![0; surface.positions.len()];
-    for (t, across) in surface.neighbours.iter().enumerate() {
-        let (ends, nodes) = (surface.corners(t as u32), surface.triangles[t]);
-        let creases = smooth.creases_of(t as u32);
-        for k in (0..3).filter(|&k| creases[k] && across[k] != u32::MAX && across[k] as usize > t) {
-            let next = (k + 1) % 3;
-            let [first, second] = [t, across[k] as usize].map(|t| surface.normals[t]);
-            if first.cross(second).dot(ends[next] - ends[k]) > 0.0 {
-                counts[nodes[k] as usize] += 1;
-                counts[nodes[next] as usize] += 1;
-            }
-        }
+    for node in smooth.convex_creases(surface).flat_map(|crease| crease.nodes) {
+        counts[node as usize] += 1;
     }
     surface.positions.iter().zip(counts).filter(|&(_, count)| count >= LEAST_CREASES).map(|(&at, _)| at).collect()
 }

@@ -25,14 +25,14 @@
 //!
 //! Both are functions of `p` alone, so that the force is the gradient of one energy as before.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
 
 use glam::{DMat3, DVec3};
 
-use super::SurfaceQuery;
 use super::footprint::smooth_step;
-use super::smooth::{FootPoint, SmoothSurface};
+use super::smooth::{ConvexCrease, FootPoint, SmoothSurface};
+use super::{SurfaceQuery, TriangleLists};
 use crate::math::{acos, hypot};
 use crate::memory::Ranges;
 use crate::mesh::Surface;
@@ -43,9 +43,9 @@ const LEAST_SHARE: f64 = 0.35;
 const BESIDE: [f64; 2] = [-0.5, 0.667];
 /// `m = q (M_0 + M_1 q)` with the turn `q` of the normal over a right angle, and its largest value.
 const BY_TURN: [f64; 2] = [0.8, 0.2];
+const MOST_BY_TURN: f64 = 1.0;
 /// Turn of the normal over a right angle beyond which an edge is a blade, which bends as a whole.
 const BLADE: f64 = 1.5;
-const MOST_BY_TURN: f64 = 1.0;
 /// `w` over the sphere's radius.
 const SLOWED: f64 = 0.3;
 /// Edges up to this distance from a triangle, over the radius, are listed for it.
@@ -73,16 +73,15 @@ struct Edge {
     normals: [DVec3; 2],
     /// `m (1 - L)`.
     deficit: f64,
-    /// Rank of the edge of which it is a piece.
+    /// Number of the edge; all its pieces have the same.
     chain: u32,
 }
 
 /// Sharp convex edges of a surface, for a sphere.
 pub struct ConvexEdges {
     edges: Vec<Edge>,
-    /// For each drawn triangle the start of its edges in `near`; one more for the end. Pieces of one edge follow each other.
-    offsets: Vec<u32>,
-    near: Vec<u32>,
+    /// Those near each drawn triangle; pieces of one edge follow each other.
+    near: TriangleLists,
     radius: f64,
 }
 
@@ -241,27 +240,17 @@ impl ConvexEdges {
         if edges.is_empty() {
             return None;
         }
-        let mut lists = vec![BTreeSet::new(); surface.triangles.len()];
         let reach = DVec3::splat(LISTED * radius);
-        for (rank, edge) in edges.iter().enumerate() {
-            let [first, second] = edge.ends;
-            query.for_each_within(first.min(second) - reach, first.max(second) + reach, |triangle| {
-                lists[triangle as usize].insert(rank as u32);
-            });
-        }
-        let mut offsets = vec![0];
-        let mut near = Vec::new();
-        for list in lists {
-            near.extend(list);
-            offsets.push(near.len() as u32);
-        }
-        Some(Self { edges, offsets, near, radius })
+        let boxes = edges
+            .iter()
+            .map(|&Edge { ends: [first, second], .. }| [first.min(second) - reach, first.max(second) + reach]);
+        let near = TriangleLists::new(surface, query, boxes);
+        Some(Self { edges, near, radius })
     }
 
     /// Where a sphere with its centre and foot there is beside sharp edges; `None` elsewhere.
     pub fn beside(&self, foot: &FootPoint, centre: DVec3) -> Option<BesideEdges> {
-        let [from, to] = [0, 1].map(|next| self.offsets[foot.triangle as usize + next] as usize);
-        let (mut near, mut found) = (&self.near[from..to], None);
+        let (mut near, mut found) = (self.near.at(foot.triangle), None);
         while let Some(&first) = near.first() {
             let chain = self.edges[first as usize].chain;
             let count = near.iter().take_while(|&&edge| self.edges[edge as usize].chain == chain).count();
@@ -292,8 +281,7 @@ impl ConvexEdges {
     /// Whether two feet lie on both sides of one edge, or on it, within a radius.
     pub fn are_beside_one(&self, one: &FootPoint, other: &FootPoint) -> bool {
         let chain = |foot: &FootPoint| {
-            let [from, to] = [0, 1].map(|next| self.offsets[foot.triangle as usize + next] as usize);
-            let near = self.near[from..to].iter().map(|&edge| &self.edges[edge as usize]);
+            let near = self.near.at(foot.triangle).iter().map(|&edge| &self.edges[edge as usize]);
             let distances = near.map(|edge| (edge.distance_squared(foot.position), edge.chain));
             let nearest = distances.min_by(|one, other| one.0.total_cmp(&other.0));
             nearest.filter(|(squared, _)| *squared < self.radius * self.radius).map(|(_, chain)| chain)
@@ -304,37 +292,25 @@ impl ConvexEdges {
     /// Adds the memory that a tick reads.
     pub(crate) fn add_memory(&self, ranges: &mut Ranges) {
         ranges.add(&self.edges);
-        ranges.add(&self.offsets);
-        ranges.add(&self.near);
+        self.near.add_memory(ranges);
     }
 }
 
 /// Creases whose faces turn away from each other, sorted by chain.
 fn convex_edges(surface: &Surface, smooth: &SmoothSurface) -> Vec<Edge> {
     let (mut edges, mut nodes) = (Vec::new(), Vec::new());
-    for (t, across) in surface.neighbours.iter().enumerate() {
-        let (ends, creases) = (surface.corners(t as u32), smooth.creases_of(t as u32));
-        for k in (0..3).filter(|&k| creases[k] && across[k] != u32::MAX && across[k] as usize > t) {
-            let next = (k + 1) % 3;
-            let normals = [t, across[k] as usize].map(|t| surface.normals[t]);
-            let along = (ends[next] - ends[k]).normalize_or_zero();
-            if normals[0].cross(normals[1]).dot(along) > 0.0 {
-                let turn = acos(normals[0].dot(normals[1]).clamp(-1.0, 1.0)) / FRAC_PI_2;
-                if turn > BLADE {
-                    continue;
-                }
-                let by_turn = (turn * (BY_TURN[0] + BY_TURN[1] * turn)).min(MOST_BY_TURN);
-                edges.push(Edge {
-                    ends: [ends[k], ends[next]],
-                    along,
-                    into: [normals[0].cross(along), along.cross(normals[1])],
-                    normals,
-                    deficit: by_turn * (1.0 - LEAST_SHARE),
-                    chain: u32::MAX,
-                });
-                nodes.push([surface.triangles[t][k], surface.triangles[t][next]]);
-            }
+    for crease in smooth.convex_creases(surface) {
+        let ConvexCrease { ends, normals, .. } = crease;
+        let turn = acos(normals[0].dot(normals[1]).clamp(-1.0, 1.0)) / FRAC_PI_2;
+        if turn > BLADE {
+            continue;
         }
+        let along = (ends[1] - ends[0]).normalize_or_zero();
+        let into = [normals[0].cross(along), along.cross(normals[1])];
+        let by_turn = (turn * (BY_TURN[0] + BY_TURN[1] * turn)).min(MOST_BY_TURN);
+        let deficit = by_turn * (1.0 - LEAST_SHARE);
+        edges.push(Edge { ends, along, into, normals, deficit, chain: u32::MAX });
+        nodes.push(crease.nodes);
     }
     number_chains(&mut edges, &nodes);
     edges.sort_by_key(|edge| edge.chain);
@@ -343,7 +319,6 @@ fn convex_edges(surface: &Surface, smooth: &SmoothSurface) -> Vec<Edge> {
 
 /// Keeps edges without another one beside them: between two edges the body is a bar or a rim, not a wedge.
 fn keep_single(edges: &mut Vec<Edge>, distance: f64) {
-    use std::collections::BTreeMap;
     let middle = |edge: &Edge| (edge.ends[0] + edge.ends[1]) * 0.5;
     // Pieces by cubes of a size that holds each and its surroundings.
     let longest = edges.iter().map(|edge| edge.ends[0].distance(edge.ends[1])).fold(distance, f64::max);
@@ -365,7 +340,7 @@ fn keep_single(edges: &mut Vec<Edge>, distance: f64) {
 
 /// Numbers the chains of pieces that go on in about the same direction.
 fn number_chains(edges: &mut [Edge], nodes: &[[u32; 2]]) {
-    let mut at_node: std::collections::BTreeMap<u32, Vec<usize>> = Default::default();
+    let mut at_node: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
     for (edge, ends) in nodes.iter().enumerate() {
         ends.iter().for_each(|&node| at_node.entry(node).or_default().push(edge));
     }
@@ -391,6 +366,8 @@ fn number_chains(edges: &mut [Edge], nodes: &[[u32; 2]]) {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
     use crate::contact::smooth::DrawnSurface;
     use crate::contact::smooth::tests::{ball, cube, near};

@@ -21,6 +21,7 @@ pub mod smooth;
 mod tessellation;
 mod thin;
 mod touch_patch;
+mod triangle_lists;
 
 pub(crate) use closest::barycentric;
 pub use closest::{SurfacePoint, SurfaceQuery};
@@ -39,3 +40,4 @@ pub use regular_store::remove_compliance_files;
 pub use tessellation::Tessellation;
 pub use thin::{is_thin_at, thickness_for};
 pub use touch_patch::TouchPatch;
+pub(crate) use triangle_lists::TriangleLists;

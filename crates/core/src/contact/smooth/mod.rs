@@ -29,6 +29,16 @@ const SAME_SIDE: f64 = 0.0;
 /// Distance over a triangle's size up to which a point beside it is evaluated with its fans.
 const MARGIN: f64 = 1.2;
 
+/// A crease whose faces turn away from each other.
+pub struct ConvexCrease {
+    /// Nodes at its ends.
+    pub nodes: [u32; 2],
+    /// Their positions, m.
+    pub ends: [DVec3; 2],
+    /// Normals of both faces, first of the one that it goes round counter-clockwise.
+    pub normals: [DVec3; 2],
+}
+
 /// Fans of a surface, and the fans that reach each triangle.
 pub struct SmoothSurface {
     pub(super) fans: Vec<Fan>,
@@ -106,6 +116,24 @@ impl SmoothSurface {
     /// Whether each edge of a triangle is a crease.
     pub fn creases_of(&self, triangle: u32) -> [bool; 3] {
         self.creases[triangle as usize]
+    }
+
+    /// Creases whose faces turn away from each other.
+    pub fn convex_creases<'a>(&'a self, surface: &'a Surface) -> impl Iterator<Item = ConvexCrease> + 'a {
+        surface.neighbours.iter().enumerate().flat_map(move |(t, across)| {
+            let (ends, nodes, creases) = (surface.corners(t as u32), surface.triangles[t], self.creases[t]);
+            let both = move |k: usize| creases[k] && across[k] != u32::MAX && across[k] as usize > t;
+            (0..3).filter(move |&k| both(k)).filter_map(move |k| {
+                let next = (k + 1) % 3;
+                let crease = ConvexCrease {
+                    nodes: [nodes[k], nodes[next]],
+                    ends: [ends[k], ends[next]],
+                    normals: [t, across[k] as usize].map(|t| surface.normals[t]),
+                };
+                let [first, second] = crease.normals;
+                (first.cross(second).dot(ends[next] - ends[k]) > 0.0).then_some(crease)
+            })
+        })
     }
 
     /// For each node of the surface whether a crease ends or passes there.

@@ -188,7 +188,7 @@ pub fn update_parts(model: &Model, state: &mut State, responses: &[LocalResponse
             }
             let whole = responses[a].indentation.energy / local.part;
             let bound = if whole > 0.0 { state.tools[tool].released_energy / whole } else { f64::INFINITY };
-            // A contact that fades does not follow its tool far: its plane goes on where the body ends.
+            // The plane of a fading contact has no end, but the body has: the contact fades faster, the faster its tool moves.
             let left_behind = if local.is_fading { local.travel / model.tools[tool].radius } else { 0.0 };
             let part = (local.part + (local.part_rate - left_behind).min(bound)).clamp(LEAST_PART, 1.0);
             state.tools[tool].released_energy += (local.part - part) * whole;

@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3};
 
 use super::half_space::{Fields, Indentation, LocalBody};
-use super::inclination::{OtherContacts, compliance_slope, slope};
+use super::inclination::{OtherContacts, slope};
 use crate::contact::BesideEdges;
 use crate::contact::regular::{PLANE_STRAIN, blend_fields};
 use crate::contact::smooth::{FanWeights, FootPoint};
@@ -14,8 +14,6 @@ use crate::tensor::outer;
 pub struct NearEdge {
     beside: BesideEdges,
     bending: DMat3,
-    /// Derivative of the force that inclines the contact by the force.
-    pub slope_by_force: DMat3,
 }
 
 impl NearEdge {
@@ -32,8 +30,7 @@ impl NearEdge {
         body.smooth.weigh(&fixed, weights);
         let by_foot = slope(body, force, OtherContacts::default(), &blend_fields(weights, body.fields, false));
         body.smooth.weigh(&beside.slowed, weights);
-        let slope_by_force = compliance_slope(body, force, &blend_fields(weights, body.fields, false));
-        Some(Self { beside, bending: beside.bending(by_foot), slope_by_force })
+        Some(Self { beside, bending: beside.bending(by_foot) })
     }
 
     /// Gives the half-space its share of the modulus.

@@ -146,7 +146,7 @@ pub(super) fn evaluate_sphere(
     response.slope = slope(body, guess.force, others, &fields);
     if let Some(near_edge) = &near_edge {
         response.bending = near_edge.bending(&response.indentation, response.foot.normal);
-        response.slope_by_force = near_edge.slope_by_force;
+        response.slope_by_force = compliance_slope(body, guess.force, &fields);
     }
     if let Some(series) = body.series {
         let (blended, known) = blended_series(series, weights);

@@ -391,21 +391,25 @@ fn evaluate_contacts(
 /// One step of Newton's method; returns the longest over the contacts, m, and whether one of them is unstable. Steps with pressure
 /// cells are bounded by their residuals instead.
 fn newton_step(local: &mut LocalScratch, system: &mut System, count: usize, cells: bool) -> (f64, bool) {
-    let mut unstable = false;
+    let (mut jacobians, mut unstable) = ([DMat3::ZERO; MAX_CONTACTS], false);
+    for (a, jacobian) in jacobians[..count].iter_mut().enumerate() {
+        *jacobian = local.responses[a].jacobian;
+        if !cells {
+            let is_unstable;
+            (*jacobian, is_unstable) = stable_jacobian(*jacobian, &local.between[a][a]);
+            unstable |= is_unstable;
+        }
+    }
     for a in 0..count {
         let mut residual = local.positions[a] - local.free_positions[a];
         for b in 0..count {
             let between = local.between[a][b];
             residual += between * local.responses[b].force;
-            let jacobian = local.responses[b].jacobian;
-            let (jacobian, is_unstable) =
-                if cells { (jacobian, false) } else { stable_jacobian(jacobian, &local.between[b][b]) };
-            unstable |= is_unstable;
-            let mut block = between * jacobian;
+            let mut block = between * jacobians[b];
             if a == b {
                 let response = &local.responses[a];
                 residual += response.higher.displacement;
-                block += DMat3::IDENTITY + response.higher.compliance * jacobian;
+                block += DMat3::IDENTITY + response.higher.compliance * jacobians[a];
                 block += response.displacement_by_position();
             }
             for row in 0..3 {
