@@ -193,24 +193,31 @@ def require_scheduler(client: Client) -> None:
 
 
 def result_of(client: Client, future: Future) -> Any:
-    """Take the result of a task that has finished.
+    """Take the result of a task that has ended; one that was lost with its worker is computed again, and waited for.
 
     Raises
     ------
     ClusterError
-        The scheduler is lost, from which it comes: the library would wait for it for ever.
+        The task failed for want of workers or of the same version of Palpate, or the scheduler is lost, from which the
+        result comes: the library would wait for it for ever.
+    Exception
+        What the task itself raised.
 
     """
     patience = CONNECT_SECONDS
     while True:
         try:
             return future.result(timeout=patience)
-        except TimeoutError:
+        except Exception as error:
+            if future.status == "error":
+                raise _failure(future) from None
+            if not isinstance(error, TimeoutError):
+                raise
             require_scheduler(client)
             patience *= 2  # large results take longer
 
 
-def failure(future: Future) -> Exception:
+def _failure(future: Future) -> Exception:
     """Say why a task failed, as an error of Palpate where that can be."""
     from distributed.scheduler import KilledWorker
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import time
 import types
 from pathlib import Path
 
@@ -63,6 +64,19 @@ def test_one_worker_killed_half_way_leaves_the_bits_of_one_machine(workers, body
     assert green.path.read_bytes() == undisturbed
     assert os.listdir(tmp_path) == ["a.palpate"]
     assert seen == sorted(seen) and seen[0] == 0 and seen[-1] == 3 * len(body.mesh.surface_nodes)
+
+
+def test_a_result_that_is_lost_with_its_worker_is_computed_again(workers):
+    with connected(workers.scheduler_address) as client:
+        client.wait_for_workers(2, timeout=120)
+        first = client.run(os.getpid)
+        future = clusters.submit(client, os.getpid)
+        assert clusters.wait_for_some(client, [future]) == [future]
+        (holder,) = client.who_has([future])[future.key]
+        os.kill(first[holder], signal.SIGKILL)
+        while holder in clusters.threads_of_workers(client):
+            time.sleep(0.01)
+        assert clusters.result_of(client, future) != first[holder]
 
 
 def held_factors():

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from palpate import _native
-from palpate.cluster import failure, require_scheduler, result_of, spread, submit, threads_of_workers, wait_for_some
+from palpate.cluster import require_scheduler, result_of, spread, submit, threads_of_workers, wait_for_some
 from palpate.errors import ClusterError
 from palpate.green import worker
 from palpate.green.bounds import CHOSEN
@@ -71,8 +71,6 @@ def _measure(client: Client, held: Future, job: worker.FactorRequest) -> list[Fu
 def _first(client: Client, futures: list[Future]) -> tuple[tuple[Any, ...], bytes] | None:
     """Wait for the first task that ends, and give its result; None if none has for a while."""
     for future in wait_for_some(client, futures):
-        if future.status != "finished":
-            raise failure(future)
         return result_of(client, future)
     return None
 
@@ -96,8 +94,6 @@ def _gather(
     for block, future in spread(
         client, waiting, lambda block, address: submit(client, worker.solve, *task, block, width, address=address)
     ):
-        if future.status != "finished":
-            raise failure(future)
         if not store.put(block, *result_of(client, future)):
             damaged[block] += 1
             if damaged[block] == MOST_DAMAGED:
