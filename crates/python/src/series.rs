@@ -221,7 +221,7 @@ impl GatheredSeries {
     fn put(&self, py: Python<'_>, block: usize, fields: &[u8], sum: &[u8]) -> bool {
         py.detach(|| {
             let mut series = self.held();
-            let size = series.block(block).len() * size_of::<SeriesFields>();
+            let size = size_of_val(series.block(block));
             if fields.len() != size || checksum(fields)[..] != *sum {
                 return false;
             }
