@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import sys
 import time
@@ -21,6 +22,7 @@ import palpate
 from palpate import cluster as clusters
 from palpate.cluster import connected
 from palpate.green import worker
+from palpate.green.series import SeriesJob
 from palpate.study import Study
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -64,6 +66,56 @@ def test_one_worker_killed_half_way_leaves_the_bits_of_one_machine(workers, body
     assert green.path.read_bytes() == undisturbed
     assert os.listdir(tmp_path) == ["a.palpate"]
     assert seen == sorted(seen) and seen[0] == 0 and seen[-1] == 3 * len(body.mesh.surface_nodes)
+
+
+def test_a_series_by_two_workers_has_the_bits_of_one_machine(workers, tmp_path):
+    mesh = box_mesh(cells=(8, 8, 4))
+    material = palpate.Material(1e4, 0.45, law="neo-hookean")
+    held = palpate.Body(mesh, material=material, fixed=lambda p: p[:, 2] < 1e-9)
+    green = palpate.precompute(held, path=tmp_path / "a.palpate", progress=False)
+    job = SeriesJob.of(green, held, 0.006)
+    alone, killed, seen = job.compute(), [], []
+    job.file().path.unlink()
+
+    def kill_one(done, total):
+        seen.append(done)
+        if done >= total // 2 and not killed:
+            killed.append(next(iter(pids.values())))
+            os.kill(killed[0], signal.SIGKILL)
+
+    with connected(workers.scheduler_address) as client:
+        client.wait_for_workers(2, timeout=120)
+        pids = client.run(os.getpid)
+        series = job.compute(kill_one, client)
+        client.wait_for_workers(2, timeout=120)
+        assert set(client.run(held_factors).values()) == {0}
+    assert series.is_complete and killed
+    assert seen == sorted(seen) and seen[0] == 0 and seen[-1] == series.places
+    for known in (series, job.file().load()):
+        assert np.array_equal(known.fields, alone.fields) and np.array_equal(known.positions, alone.positions)
+
+
+def test_a_scene_is_precomputed_by_a_cluster(workers, tmp_path):
+    box_mesh(cells=(6, 4, 4)).write(tmp_path / "box.vtu")
+    scene = """
+[body]
+mesh = "box.vtu"
+[supports]
+fixed = "z < min + 1mm"
+[tool]
+radius = "12mm"
+"""
+    (tmp_path / "box.toml").write_text(scene)
+    result = run("precompute", "box.toml", "--dask", workers.scheduler_address, cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    planned, store, done = result.stdout.splitlines()[-3:]
+    series = re.fullmatch(
+        r"series beyond small strain below spheres of 12 mm: (\d+) places, .* MB, time about .*", planned
+    )
+    assert f"spheres of 12 mm: {series[1]} places" in done
+    again = run("info", store.split(": ")[0], cwd=tmp_path)
+    assert f"series beyond small strain at all {series[1]} places" in again.stdout
+    refused(run("precompute", "box.toml", "--touch", "z > 0", cwd=tmp_path), "--touch", "a scene has its own bodies")
 
 
 def test_a_result_that_is_lost_with_its_worker_is_computed_again(workers):

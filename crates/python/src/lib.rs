@@ -74,7 +74,7 @@ mod _native {
     #[pymodule_export]
     use crate::sensor::SensorCore;
     #[pymodule_export]
-    use crate::series::{Series, SeriesFile};
+    use crate::series::{GatheredSeries, Series, SeriesBlocks, SeriesFile};
     #[pymodule_export]
     use crate::simulation::SimulationCore;
     #[pymodule_export]

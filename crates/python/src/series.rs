@@ -1,16 +1,18 @@
 //! Taylor series of bodies beyond small strain.
 
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use glam::DVec3;
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use palpate_core::Error;
+use palpate_core::contact::SeriesFields;
 use palpate_core::contact::local::{SERIES_FIELDS, StrainLaw};
-use palpate_core::series;
+use palpate_core::green::checksum;
+use palpate_core::series::{self, HyperelasticBody, SeriesPlan};
 use palpate_core::simulation::KnownSeries;
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
+use pyo3::types::{PyBytes, PyTuple};
 
 use crate::errors::to_python;
 use crate::green::problem;
@@ -101,8 +103,8 @@ impl Series {
 /// The file of a series.
 #[pyclass(frozen, module = "palpate._native")]
 pub struct SeriesFile {
-    file: series::SeriesFile,
-    laws: Vec<StrainLaw>,
+    file: Arc<series::SeriesFile>,
+    laws: Arc<[StrainLaw]>,
     radius: f64,
     near: Mutex<Option<DVec3>>,
 }
@@ -120,7 +122,7 @@ impl SeriesFile {
     ) -> PyResult<Self> {
         let laws = laws(&law_arguments).map_err(|e| to_python(py, e))?;
         let file = series::SeriesFile::beside(&store, green_key, &laws, radius);
-        Ok(Self { file, laws, radius, near: Mutex::new(None) })
+        Ok(Self { file: Arc::new(file), laws: laws.into(), radius, near: Mutex::new(None) })
     }
 
     /// Its path.
@@ -142,11 +144,141 @@ impl SeriesFile {
     /// Computes and stores what is not stored yet; `progress` is called with the known places and all of them.
     #[pyo3(signature = (arguments, progress=None))]
     fn compute(&self, py: Python<'_>, arguments: &Bound<'_, PyTuple>, progress: Option<Py<PyAny>>) -> PyResult<Series> {
-        let problem = problem(arguments)?;
+        let problem = Arc::new(problem(arguments)?);
         let near = || *self.near.lock().unwrap_or_else(PoisonError::into_inner);
-        let given = (&problem, &self.laws[..]);
-        let computed =
-            run_interruptible(py, 0, progress.as_ref(), |note| self.file.compute(given, self.radius, &near, note));
+        let computed = run_interruptible(py, 0, progress.as_ref(), |note| {
+            self.file.compute(&SeriesPlan::new(problem.clone(), self.laws.clone(), self.radius)?, &near, note)
+        });
         computed.map(|series| Series { series })
+    }
+
+    /// Places, those that are not stored yet, the points of quadrature at which each is summed, and the bytes of the whole file.
+    fn count(&self, py: Python<'_>, arguments: &Bound<'_, PyTuple>) -> PyResult<(usize, usize, usize, usize)> {
+        let plan = self.plan(py, arguments)?;
+        let count = || {
+            let layout = plan.layout();
+            let (places, bytes) = (layout.places.len(), series::SeriesFile::size(&layout));
+            (places, places - self.file.resume(layout).done(), plan.points(), bytes)
+        };
+        Ok(py.detach(count))
+    }
+
+    /// What is stored, to be completed by blocks from elsewhere.
+    fn gathering(&self, py: Python<'_>, arguments: &Bound<'_, PyTuple>) -> PyResult<GatheredSeries> {
+        let plan = self.plan(py, arguments)?;
+        let series = py.detach(|| self.file.resume(plan.layout()));
+        Ok(GatheredSeries { file: self.file.clone(), series: Mutex::new(series) })
+    }
+}
+
+impl SeriesFile {
+    fn plan(&self, py: Python<'_>, arguments: &Bound<'_, PyTuple>) -> PyResult<SeriesPlan> {
+        let problem = Arc::new(problem(arguments)?);
+        py.detach(|| SeriesPlan::new(problem, self.laws.clone(), self.radius)).map_err(|e| to_python(py, e))
+    }
+}
+
+/// Blocks of a series on their way into its file.
+#[pyclass(frozen, module = "palpate._native")]
+pub struct GatheredSeries {
+    file: Arc<series::SeriesFile>,
+    series: Mutex<series::Series>,
+}
+
+impl GatheredSeries {
+    fn held(&self) -> MutexGuard<'_, series::Series> {
+        self.series.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[pymethods]
+impl GatheredSeries {
+    /// Hash of the places in their order.
+    #[getter]
+    fn order<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
+        PyBytes::new(py, &self.held().layout.order())
+    }
+
+    /// How many places are known.
+    #[getter]
+    fn done(&self) -> usize {
+        self.held().done()
+    }
+
+    /// How many places there are.
+    #[getter]
+    fn places(&self) -> usize {
+        self.held().layout.places.len()
+    }
+
+    /// Blocks that are not known.
+    fn missing(&self) -> Vec<usize> {
+        self.held().next(usize::MAX, None)
+    }
+
+    /// Adds the coefficients (k, 9) of a block, and stores all that is known if the file can be written; `false` for numbers of
+    /// another block or with another checksum.
+    fn put(&self, py: Python<'_>, block: usize, fields: &[u8], sum: &[u8]) -> bool {
+        py.detach(|| {
+            let mut series = self.held();
+            let size = size_of_val(series.block(block));
+            if fields.len() != size || checksum(fields)[..] != *sum {
+                return false;
+            }
+            let mut numbers = vec![SeriesFields::default(); series.block(block).len()];
+            bytemuck::cast_slice_mut(&mut numbers).copy_from_slice(fields);
+            series.set(block, &numbers);
+            // The result is the same if it cannot be written.
+            drop(self.file.write(&series));
+            true
+        })
+    }
+
+    /// The series as far as it is known.
+    fn known(&self) -> Series {
+        Series { series: self.held().clone() }
+    }
+}
+
+/// A factored body: the coefficients of any block of places, from any thread.
+#[pyclass(frozen, module = "palpate._native")]
+pub struct SeriesBlocks {
+    plan: SeriesPlan,
+    body: HyperelasticBody,
+}
+
+#[pymethods]
+impl SeriesBlocks {
+    /// Factorises a body on some threads.
+    #[new]
+    fn new(
+        py: Python<'_>,
+        arguments: &Bound<'_, PyTuple>,
+        law_arguments: LawArguments<'_>,
+        radius: f64,
+        threads: usize,
+    ) -> PyResult<Self> {
+        let problem = Arc::new(problem(arguments)?);
+        let laws = laws(&law_arguments).map_err(|e| to_python(py, e))?;
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let pool = pool.map_err(|e| to_python(py, Error::Invalid(format!("no threads could be started: {e}"))))?;
+        let made = || {
+            let plan = SeriesPlan::new(problem, laws.into(), radius)?;
+            plan.factorize().map(|body| Self { plan, body })
+        };
+        py.detach(|| pool.install(made)).map_err(|e| to_python(py, e))
+    }
+
+    /// Hash of the places in their order.
+    #[getter]
+    fn order<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
+        PyBytes::new(py, &self.plan.layout().order())
+    }
+
+    /// Coefficients (k, 9) of a block, and their checksum.
+    fn solve<'py>(&self, py: Python<'py>, block: usize) -> (Bound<'py, PyBytes>, Bound<'py, PyBytes>) {
+        let fields = py.detach(|| self.plan.solve(&self.body, block));
+        let bytes: &[u8] = bytemuck::cast_slice(fields.as_flattened());
+        (PyBytes::new(py, bytes), PyBytes::new(py, &checksum(bytes)))
     }
 }

@@ -8,6 +8,7 @@ from palpate.cli import (  # noqa: F401  they register their commands
     fitting,
     mapping,
     packing,
+    precomputing,
     recordings,
     running,
     sessions,

@@ -11,22 +11,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from palpate.cli.bodies import (
-    Dask,
-    ElementChoice,
     MaxSize,
     MaxVolumeLoss,
     MesherChoice,
     Part,
     Segments,
     Unit,
-    body_of,
     fill_options,
     in_unit,
     is_surface,
-    materials_of,
-    read_any,
 )
-from palpate.cli.completion import precisions, units
+from palpate.cli.completion import units
+from palpate.cli.store_lines import green_line, precision_line
 from palpate.segmentation.endings import is_segmentation
 from palpate.startup import restore_interrupts
 
@@ -139,81 +135,6 @@ def mesh(
 
 
 @app.command()
-def precompute(
-    mesh: Annotated[Path, typer.Argument(help="Volume mesh, or a surface or segmentation to fill.")],
-    fix: Annotated[str, typer.Option(help="Supported nodes, such as 'z < 0.01' or 'z < min + 5mm'.")],
-    youngs_modulus: Annotated[str, typer.Option("-E", help="Young's modulus, such as 10kPa.")] = "10kPa",
-    poissons_ratio: Annotated[float, typer.Option("--nu", help="Poisson's ratio, below 0.5.")] = 0.45,
-    density: Annotated[str, typer.Option(help="Density, such as 1000kg/m3; used with --gravity.")] = "1000kg/m3",
-    gravity: Annotated[
-        str | None, typer.Option(help="Acceleration under which the body sags, m/s^2, such as 0,0,-9.81.")
-    ] = None,
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="File of the store; default: in the cache.")] = None,
-    unit: Unit = None,
-    precision: Annotated[
-        str | None,
-        typer.Option(
-            help="Stored number format: f16, f32 or f64; default: the cheapest that answers touches to 0.03 %.",
-            autocompletion=precisions,
-        ),
-    ] = None,
-    touch: Annotated[
-        str | None, typer.Option(help="Touchable surface: 'z > 3cm', or a region of the mesh file; default: all.")
-    ] = None,
-    first: Annotated[
-        str | None,
-        typer.Option(help="Part to compute first; the store is written as soon as this part is ready."),
-    ] = None,
-    element: ElementChoice = None,
-    max_size: MaxSize = None,
-    mesher: MesherChoice = None,
-    part: Part = None,
-    max_volume_loss: MaxVolumeLoss = None,
-    segment: Segments = None,
-    memory: Annotated[
-        str | None, typer.Option(help="Largest memory, such as 8GB; with --dask for each worker.")
-    ] = None,
-    dask: Dask = None,
-) -> None:
-    """Solve the body once, so that any touch is answered in microseconds.
-
-    The command prints the time, memory and disk that it needs, and stops if there is too little.
-    Ctrl-C keeps finished columns in STORE.partial; the same command continues from there, with or without --dask.
-
-    Example: palpate precompute liver.vtu --fix "z < min + 5mm" -E 10kPa --nu 0.45 -o liver.palpate
-
-    Example: palpate precompute liver.vtu --fix "z < min + 5mm" --touch "z > 2cm" --first "z > 3cm" -o a.palpate
-    """
-    from palpate import units
-    from palpate.body import Loads, Material, surface_region
-    from palpate.cli.bodies import cluster
-    from palpate.errors import StoreError
-    from palpate.green import GreensFunction, plan, precompute
-    from palpate.input_file import require_writable
-
-    if out is not None:
-        require_writable(out, StoreError)
-    material = Material(units.pressure(youngs_modulus), poissons_ratio, units.density(density))
-    loads = None if gravity is None else Loads(gravity=[units.acceleration(g) for g in gravity.split(",")])
-    fill = fill_options(mesher, part, max_volume_loss, segment)
-    with cluster(dask) as workers:
-        volume_mesh = in_unit(unit, lambda unit: read_any(mesh, unit, element, max_size, fill))
-        body = body_of(volume_mesh, materials_of(volume_mesh, material, segment), fix, loads)
-        region = None if touch is None else surface_region(body, touch, "--touch")
-        asked = {"precision": precision, "touch": region, "first": first}
-        asked |= {"path": out, "memory": memory, "dask": workers}
-        planned = plan(body, **asked)
-        print(f"{planned}{' at most: the precision is chosen by the body' if precision is None else ''}")
-
-        def ready(green: GreensFunction) -> None:
-            print(f"{green.path}: {len(green.touchable_nodes)} nodes can be touched by now")
-
-        green = precompute(body, **asked, ready=ready if workers is None else None)
-    print(f"{green.path}: {_green_line(green)}")
-    print(_precision_line(green))
-
-
-@app.command()
 def touch(
     store: Annotated[Path, typer.Argument(help="A precomputed store.")],
     point: Annotated[str, typer.Option(help="Contact point, such as 10mm,0,35mm.")],
@@ -281,8 +202,8 @@ def info(
         return
     if file.suffix == ".palpate":
         green = GreensFunction.load(file)
-        print(f"{file}: {_green_line(green)}")
-        print(f"  {_precision_line(green)}")
+        print(f"{file}: {green_line(green)}")
+        print(f"  {precision_line(green)}")
         _print_origin(green.description, green.key)
         for line in lines_of_series(file):
             print(f"  {line}")
@@ -356,21 +277,3 @@ def _print_origin(description: dict[str, object], key: str) -> None:
     for name, value in ((name, value) for name, value in description.items() if name != "surface_moduli"):
         print(f"  {name.replace('_', ' ')}: {value}")
     print(f"  key: {key}")
-
-
-def _precision_line(green) -> str:
-    from palpate.green import error_text
-
-    touch, stamp = error_text(green.touch_error), error_text(green.stamp_error)
-    return f"precision {green.precision}: touches right to {touch}, nodal forces under a stamp to {stamp}, as measured"
-
-
-def _green_line(green) -> str:
-    from palpate.mesh import size_text
-
-    size = green.path.stat().st_size / 1e6
-    return (
-        f"Green's function of a body of {size_text(green.extents)}, {len(green.touchable_nodes)} of "
-        f"{len(green.surface_nodes)} surface nodes touchable, {len(green.fixed_nodes)} nodes fixed, {green.precision}, "
-        f"{size:.1f} MB"
-    )

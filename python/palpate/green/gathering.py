@@ -1,4 +1,4 @@
-"""Precomputation by the workers of a cluster: they solve blocks of columns, this process writes the store."""
+"""Precomputation by the workers of a cluster: they solve blocks, this process writes the files."""
 
 from __future__ import annotations
 
@@ -56,7 +56,11 @@ def precompute_on(
             raise ClusterError("the workers order the columns differently: install the same build of Palpate there")
         store = _native.ColumnStore(layout, precision, CHOSEN, measured, what.target, what.description, claim)
         _, width, *_ = measured
-        _gather(client, (held, job, order), width, store, report)
+
+        def solve(block: int, address: str) -> Future:
+            return submit(client, worker.solve, held, job, order, block, width, address=address)
+
+        _gather(client, store.missing(), solve, store.put, lambda: (store.done, store.columns), report)
         store.finish(report)
         return store.discarded
     finally:
@@ -75,29 +79,56 @@ def _first(client: Client, futures: list[Future]) -> tuple[tuple[Any, ...], byte
     return None
 
 
+def series_on(
+    client: Client,
+    problem: worker.Arrays,
+    job: worker.SeriesRequest,
+    file: _native.SeriesFile,
+    report: Report,
+) -> _native.Series:
+    """Complete a series. Finished blocks are kept in its file, whatever happens to the cluster.
+
+    Raises
+    ------
+    ClusterError
+        Workers that fail, or a scheduler that is lost.
+
+    """
+    gathered = file.gathering(problem)
+    held = submit(client, worker.pass_through, problem)
+
+    def solve(block: int, address: str) -> Future:
+        return submit(client, worker.solve_series, held, job, gathered.order, block, address=address)
+
+    try:
+        _gather(client, gathered.missing(), solve, gathered.put, lambda: (gathered.done, gathered.places), report)
+        return gathered.known()
+    finally:
+        _release(client, job.key)
+
+
 def _gather(
     client: Client,
-    task: tuple[Future, worker.FactorRequest, bytes],
-    width: int,
-    store: _native.ColumnStore,
+    missing: list[int],
+    solve: Callable[[int, str], Future],
+    put: Callable[..., bool],
+    counts: Callable[[], tuple[int, int]],
     report: Report,
 ) -> None:
     """Have the missing blocks solved, and keep them."""
 
     def tell() -> None:
         if report is not None:
-            report(store.done, store.columns)
+            report(*counts())
 
     tell()
     damaged: Counter[int] = Counter()
-    waiting = store.missing()[::-1]
-    for block, future in spread(
-        client, waiting, lambda block, address: submit(client, worker.solve, *task, block, width, address=address)
-    ):
-        if not store.put(block, *result_of(client, future)):
+    waiting = missing[::-1]
+    for block, future in spread(client, waiting, solve):
+        if not put(block, *result_of(client, future)):
             damaged[block] += 1
             if damaged[block] == MOST_DAMAGED:
-                raise ClusterError(f"block {block} of columns was damaged in transit {MOST_DAMAGED} times")
+                raise ClusterError(f"block {block} was damaged in transit {MOST_DAMAGED} times")
             waiting.append(block)
         tell()
 

@@ -4,22 +4,59 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from palpate import _native
 from palpate.body import Body, SurfaceRegion
 from palpate.green.disk import DiskUse, free_bytes
 from palpate.green.job import Job
 from palpate.green.memory import memory_in_use
+from palpate.green.series import SeriesJob
 
 if TYPE_CHECKING:
     from distributed import Client
 
 # Operations of factor and columns a second, over those of a product of matrices: of a million tetrahedra on two cores.
 FACTOR_EFFICIENCY, COLUMN_EFFICIENCY = 0.7, 0.9
+# Operations of a product of matrices that take as long as one of a sweep with eight columns, and as the sum of a series
+# at a point of quadrature: of the built-in bodies and the examples.
+SWEEP_COST, POINT_COST = 4.0, 5e4
 # Time over which the product is repeated, s.
 CALIBRATION = 0.1
+
+
+@dataclass(frozen=True)
+class SeriesPlan:
+    """Counts of the series of a hyperelastic body below spheres of a radius.
+
+    Attributes
+    ----------
+    radius
+        m.
+    places, missing
+        All places, and those that are not stored yet.
+    size
+        Bytes of the file.
+    seconds
+        Estimate of the time that the missing ones take on this machine, s.
+
+    """
+
+    radius: float
+    places: int
+    missing: int
+    size: int
+    seconds: float
+
+    def __str__(self) -> str:
+        """One line for people."""
+        time_text = f"time about {_time_text(self.seconds)}, estimated" if self.missing else "stored"
+        return (
+            f"series beyond small strain below spheres of {1e3 * self.radius:g} mm: {self.places} places, "
+            f"{self.size / 1e6:.2g} MB, {time_text}"
+        )
 
 
 @dataclass(frozen=True)
@@ -52,6 +89,9 @@ class Plan:
     seconds
         Estimate of the time it takes on this machine, s, by its operations and the speed of short products of
         matrices; other work on the machine makes it longer.
+    series
+        Of the series below spheres of the radii that were asked for; empty for a linear body and one with loads. They
+        are computed after the Green's function, beside the running loop or before it.
 
     """
 
@@ -70,13 +110,14 @@ class Plan:
     disk: int
     disk_free: int
     seconds: float
+    series: tuple[SeriesPlan, ...] = ()
 
     def __str__(self) -> str:
-        """Three lines for people."""
+        """Three lines for people, and one for each series."""
         factor, sweeps, other = (
             f"{n / 1e9:.3g}" for n in (self.factor_flops, self.sweep_flops, self.surface_last_flops)
         )
-        return (
+        lines = (
             f"{self.columns} columns of {self.rows} rows: factor {factor} Gflop, columns {sweeps} Gflop by sweeps "
             f"(surface last: at least {other})\n"
             f"peak memory {self.memory / 1e9:.2f} GB, {self.tasks} tasks with {self.block} columns each, "
@@ -84,6 +125,7 @@ class Plan:
             f"disk {self.disk / 1e9:.3g} GB at most of {self.disk_free / 1e9:.3g} GB free, "
             f"time about {_time_text(self.seconds)}, estimated"
         )
+        return "\n".join([lines, *map(str, self.series)])
 
 
 def plan(
@@ -95,8 +137,11 @@ def plan(
     path: str | os.PathLike[str] | None = None,
     memory: int | str | None = None,
     dask: str | Client | None = None,
+    radii: Sequence[float] = (),
 ) -> Plan:
     """Count what :func:`palpate.precompute` would do with the same arguments.
+
+    With ``radii`` of spheres, m, the series of a hyperelastic body below them are counted too.
 
     With ``dask`` the memory is that of a worker with as many threads as this process has, and may be more than this
     machine has. No connection is made.
@@ -121,8 +166,19 @@ def plan(
     rate = _product_rate(single=True) if counts["precision"] == "f16" else double
     factor, columns = FACTOR_EFFICIENCY * double, COLUMN_EFFICIENCY * rate
     seconds = counts["factor_flops"] / factor + counts["sweep_flops"] / columns
-    added = {"disk": disk.peak, "disk_free": free_bytes(job.target), "seconds": seconds}
+    rates = (factor, double)
+    series = tuple(_plan_series(series, counts, rates) for series in SeriesJob.of_store(job, radii))
+    added = {"series": series, "disk": disk.peak, "disk_free": free_bytes(job.target), "seconds": seconds}
     return Plan(**{**counts, "memory": used + counts["memory"]}, **added)
+
+
+def _plan_series(job: SeriesJob, counts: dict[str, Any], rates: tuple[float, float]) -> SeriesPlan:
+    """Count a series, by operations a second of the factor and of products."""
+    places, missing, points, size = job.file().count(job.problem)
+    # Three orders are solved, each by two sweeps of two operations an entry.
+    of_place = 3 * 4 * SWEEP_COST * counts["factor_entries"] + POINT_COST * points
+    seconds = counts["factor_flops"] / rates[0] + missing * of_place / rates[1] if missing else 0.0
+    return SeriesPlan(job.radius, places, missing, size, seconds)
 
 
 def _product_rate(single: bool) -> float:

@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 import glob
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from palpate import _native
 from palpate.body import Body, problem_arrays
 from palpate.body.material import element_laws
+from palpate.cluster import connected
 from palpate.errors import StoreError
 from palpate.green.claim import claimed
 from palpate.green.function import GreensFunction
+from palpate.green.gathering import series_on
+from palpate.green.job import Job
+from palpate.green.worker import SeriesRequest
+
+if TYPE_CHECKING:
+    from distributed import Client
 
 
 @dataclass(frozen=True)
@@ -43,9 +51,16 @@ class SeriesJob:
     @classmethod
     def of(cls, green: GreensFunction, body: Body, radius: float) -> SeriesJob | None:
         """Return the job of a body; None for a linear one, one with loads and one whose store has no file."""
-        if green.path is None or body.loads is not None or not body.is_hyperelastic:
+        if green.path is None or not _has_series(body):
             return None
         return cls(body, radius, green.touchable_nodes, green.path, green.key)
+
+    @classmethod
+    def of_store(cls, job: Job, radii: Sequence[float]) -> list[SeriesJob]:
+        """Return the jobs below spheres of some radii, m, of a body whose store may be still to come."""
+        if not _has_series(job.body):
+            return []
+        return [cls(job.body, radius, job.region, job.target, job.key) for radius in radii]
 
     @property
     def laws(self) -> tuple[list[tuple[str, float, float]], np.ndarray]:
@@ -61,15 +76,20 @@ class SeriesJob:
         """Return the file."""
         return _native.SeriesFile(self.laws, self.radius, self.store, self.key)
 
-    def compute(self, progress: Callable[[int, int], None] | None = None) -> _native.Series:
+    def compute(
+        self, progress: Callable[[int, int], None] | None = None, dask: str | Client | None = None
+    ) -> _native.Series:
         """Read the series from its file, and compute and store what is missing there.
 
-        One process at a time computes it, the others wait.
+        One process at a time computes it, the others wait. With ``dask`` the workers of a cluster compute, as in
+        :func:`palpate.precompute`.
 
         Raises
         ------
         BodyError
             A body that is not held.
+        ClusterError
+            A cluster that cannot be reached, has no workers or other versions, or fails.
 
         """
         file = self.file()
@@ -84,10 +104,23 @@ class SeriesJob:
             return stored
         try:
             with claimed(file.path, wait):
-                return file.compute(self.problem, progress)
+                return self._completed(file, progress, dask)
         except OSError:
             # No file can be written there: the result is the same.
+            return self._completed(file, progress, dask)
+
+    def _completed(
+        self, file: _native.SeriesFile, progress: Callable[[int, int], None] | None, dask: str | Client | None
+    ) -> _native.Series:
+        if dask is None:
             return file.compute(self.problem, progress)
+        with connected(dask) as client:
+            request = SeriesRequest(file.path.name, _native.__version__, self.laws, self.radius)
+            return series_on(client, self.problem, request, file, progress)
+
+
+def _has_series(body: Body) -> bool:
+    return body.loads is None and body.is_hyperelastic
 
 
 def force_series(

@@ -1,8 +1,9 @@
-"""Tasks of a cluster's worker: it factorises once, and solves blocks of columns."""
+"""Tasks of a cluster's worker: it factorises once, and solves blocks of columns, or of places of a series."""
 
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -43,29 +44,51 @@ class FactorRequest:
     memory: int | str | None
 
 
+@dataclass(frozen=True)
+class SeriesRequest:
+    """What a worker is to factorise for a series, beside the arrays of the problem.
+
+    Attributes
+    ----------
+    key
+        Of the series.
+    version
+        Of Palpate, where the computation was started.
+    laws
+        Of the material, and that of each element.
+    radius
+        Of the tool, m.
+
+    """
+
+    key: str
+    version: str
+    laws: tuple[list[tuple[str, float, float]], np.ndarray]
+    radius: float
+
+
 @dataclass
 class _Factors:
     """Factored problems of this process, by key."""
 
-    held: dict[str, _native.ColumnJob] = field(default_factory=dict)
+    held: dict[str, Any] = field(default_factory=dict)
     _timers: dict[str, threading.Timer] = field(default_factory=dict)
     _making: dict[str, threading.Lock] = field(default_factory=dict)
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
-    def get(self, job: FactorRequest, problem: Arrays) -> _native.ColumnJob:
-        """Factor of a job, made if need be; several tasks wait for one of them to make it."""
+    def get(self, key: str, factorize: Callable[[], Any]) -> Any:
+        """Factor of a problem, made if need be; several tasks wait for one of them to make it."""
         with self._lock:
-            making = self._making.setdefault(job.key, threading.Lock())
+            making = self._making.setdefault(key, threading.Lock())
         with making:
-            factor = self.held.get(job.key)
+            factor = self.held.get(key)
             if factor is None:
-                memory = None if job.memory is None else allowed_memory(job.memory)
-                factor = _native.ColumnJob(problem, job.precision, CHOSEN, threads(), memory)
+                factor = factorize()
                 with self._lock:
                     # Not one that was let go while it was made.
-                    if self._making.get(job.key) is making:
-                        self.held[job.key] = factor
-        self._restart_idle_timer(job.key)
+                    if self._making.get(key) is making:
+                        self.held[key] = factor
+        self._restart_idle_timer(key)
         return factor
 
     def release(self, key: str) -> None:
@@ -122,11 +145,23 @@ def solve(problem: Arrays, job: FactorRequest, order: bytes, block: int, width: 
 
     """
     factor = _factorize(problem, job)
-    if factor.order != order:
-        raise ClusterError(
-            f"the worker at {_address()} orders the columns differently: install the same build of Palpate there"
-        )
+    _require_order(factor.order, order, "columns")
     return factor.solve(block, width)
+
+
+def solve_series(problem: Arrays, job: SeriesRequest, order: bytes, block: int) -> tuple[bytes, bytes]:
+    """Coefficients of a series at a block of places, and their checksum.
+
+    Raises
+    ------
+    ClusterError
+        This machine orders the places otherwise.
+
+    """
+    require_version(job.version, _address())
+    factor = _factors.get(job.key, lambda: _native.SeriesBlocks(problem, job.laws, job.radius, threads()))
+    _require_order(factor.order, order, "places of the series")
+    return factor.solve(block)
 
 
 def release(key: str) -> None:
@@ -136,7 +171,19 @@ def release(key: str) -> None:
 
 def _factorize(problem: Arrays, job: FactorRequest) -> _native.ColumnJob:
     require_version(job.version, _address())
-    return _factors.get(job, problem)
+
+    def factorize() -> _native.ColumnJob:
+        memory = None if job.memory is None else allowed_memory(job.memory)
+        return _native.ColumnJob(problem, job.precision, CHOSEN, threads(), memory)
+
+    return _factors.get(job.key, factorize)
+
+
+def _require_order(found: bytes, order: bytes, what: str) -> None:
+    if found != order:
+        raise ClusterError(
+            f"the worker at {_address()} orders the {what} differently: install the same build of Palpate there"
+        )
 
 
 def _address() -> str:

@@ -6,7 +6,7 @@ import contextlib
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from palpate.mesh.tetrahedralize import closed_surface, read_surface, tetrahedra
 from palpate.progress import progress_reporter
 from palpate.scene.default_radius import with_radii
 from palpate.scene.dynamics import BodyMotion
-from palpate.scene.early import Expected
+from palpate.scene.early import Expected, pressing_radii
 from palpate.scene.loads import together
 from palpate.scene.mistakes import located
 from palpate.scene.node_file import is_node_file, read_nodes
@@ -30,6 +30,9 @@ from palpate.scene.regions import MaterialTable
 from palpate.scene.tables import BodyTable, SceneTables, SupportsTable
 from palpate.segmentation.endings import is_segmentation
 from palpate.vectors import conjugate, rotated
+
+if TYPE_CHECKING:
+    from distributed import Client
 
 Progress = bool | Callable[[int, int], None]
 
@@ -112,9 +115,10 @@ def build(
     modes_progress: Progress | None,
     growing: dict[int, BackgroundPrecompute] | None = None,
     announce: Callable[[Expected], None] | None = None,
+    dask: str | Client | None = None,
 ) -> BuiltScene:
     """See :meth:`palpate.Scene.build`, and with ``growing`` :meth:`palpate.Scene.build_first`."""
-    builders = [_Builder(scene, rank, growing, progress, announce) for rank in range(len(scene.bodies))]
+    builders = [_Builder(scene, rank, growing, progress, announce, dask) for rank in range(len(scene.bodies))]
     return BuiltScene(scene, tuple(builder.build(progress, modes_progress) for builder in builders))
 
 
@@ -189,9 +193,10 @@ class _Builder:
         growing: dict[int, BackgroundPrecompute] | None = None,
         filling: Progress = True,
         announce: Callable[[Expected], None] | None = None,
+        dask: str | Client | None = None,
     ):
         self._scene, self._rank, self._growing, self._filling = scene, rank, growing, filling
-        self._announce = announce
+        self._announce, self._dask = announce, dask
         self._table: BodyTable = scene.bodies[rank]
 
     def build(self, progress: Progress, modes_progress: Progress | None) -> BuiltBody:
@@ -216,7 +221,12 @@ class _Builder:
         with self._locating_errors(where):
             asked = {"precision": self._table.precision, **area.areas(self._file_mesh)}
             if self._announce is not None:
-                self._announce(Expected.of(body, **asked))
+                moves = self._table_of_body("dynamics")[0] is not None
+                radii = () if moves else pressing_radii(self._scene, body)
+                self._announce(Expected.of(body, **asked, radii=radii))
+            if self._dask is not None:
+                # A cluster computes all at once.
+                return precompute(body, **{**asked, "first": None}, progress=progress, dask=self._dask)
             if self._growing is None or area.first is None:
                 return precompute(body, **asked, progress=progress)
             background = self._growing[self._rank] = BackgroundPrecompute(body, **asked)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,8 @@ import numpy as np
 from palpate.body import Body, SurfaceRegion
 from palpate.green import Plan, plan
 from palpate.green.job import Job
+from palpate.scene.default_radius import PART_OF_BODY
+from palpate.scene.tables import SceneTables
 
 # A body that takes longer than this, s, is touched first within this part of its longest side.
 LONG, FIRST_SHARE = 20.0, 0.15
@@ -43,8 +46,9 @@ class Expected:
         precision: str | None = None,
         touch: SurfaceRegion | None = None,
         first: SurfaceRegion | None = None,
+        radii: Sequence[float] = (),
     ) -> Expected:
-        """Look for the store of a body, or plan it, with the arguments of :func:`palpate.precompute`.
+        """Look for the store of a body, or plan it, with the arguments of :func:`palpate.plan`.
 
         Raises
         ------
@@ -55,22 +59,30 @@ class Expected:
         counts = len(body.mesh.nodes), len(body.mesh.surface_nodes)
         if Job.of(body, precision, touch, first, None).stored() is not None:
             return cls(*counts, None)
-        planned = plan(body, precision=precision, touch=touch, first=first)
+        planned = plan(body, precision=precision, touch=touch, first=first, radii=radii)
         if planned.seconds < LONG:
             return cls(*counts, planned)
         longest = float(np.ptp(body.mesh.nodes[body.mesh.surface_nodes], axis=0).max())
         return cls(*counts, planned, (seen_middle(body), FIRST_SHARE * longest))
 
     def __str__(self) -> str:
-        """One line for people; empty for a body whose store is there."""
+        """One line for people, and one for each series; empty for a body whose store is there."""
         planned = self.plan
         if planned is None:
             return ""
         size, seconds = planned.store / 1e6, max(planned.seconds, 1.0)
-        return (
+        columns = (
             f"computing {planned.columns} columns: at most {size:.3g} MB in the cache, about {seconds:.0f} s "
             f"({self.nodes:,} nodes, {self.surface_nodes:,} on the surface)"
         )
+        return "\n".join([columns, *map(str, planned.series)])
+
+
+def pressing_radii(scene: SceneTables, body: Body) -> list[float]:
+    """Radii, m, of the spheres of a scene that press a body under the local law; by the body where none is given."""
+    spheres = [tool for tool in scene.tools if tool.contact == "local" and tool.shape == "sphere"]
+    longest = float(np.ptp(body.mesh.nodes[body.mesh.surface_nodes], axis=0).max())
+    return sorted({PART_OF_BODY * longest if tool.radius is None else float(tool.radius) for tool in spheres})
 
 
 def seen_middle(body: Body) -> tuple[float, float, float]:

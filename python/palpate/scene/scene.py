@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
@@ -15,8 +15,11 @@ from palpate.input_file import read_toml
 from palpate.scene.build import BuiltScene, build, marked_as_growing, require_files
 from palpate.scene.early import Expected
 from palpate.scene.mistakes import explain, located
-from palpate.scene.series import with_stored_series
+from palpate.scene.series import with_series, with_stored_series
 from palpate.scene.tables import BodyTable, SceneTables
+
+if TYPE_CHECKING:
+    from distributed import Client
 
 
 class Scene(SceneTables):
@@ -126,6 +129,27 @@ class Scene(SceneTables):
 
         """
         return with_stored_series(build(self, progress, modes_progress, announce=announce))
+
+    def precompute(
+        self,
+        progress: bool | Callable[[int, int], None] = True,
+        announce: Callable[[Expected], None] | None = None,
+        dask: str | Client | None = None,
+    ) -> BuiltScene:
+        """Build, with all of the series beyond small strain, so that nothing is left to be computed beside a loop.
+
+        With ``dask`` the workers of a cluster compute the Green's functions and the series, as in
+        :func:`palpate.precompute`. The modes of bodies that move are found here.
+
+        Raises
+        ------
+        Error
+            As of :meth:`build`.
+        ClusterError
+            A cluster that cannot be reached, has no workers or other versions, or fails.
+
+        """
+        return with_series(build(self, progress, None, announce=announce, dask=dask), progress, dask)
 
     def build_first(
         self,

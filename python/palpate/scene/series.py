@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from palpate import _native
 from palpate.green.series import SeriesJob
 from palpate.progress import progress_reporter
 from palpate.scene.build import BuiltBody, BuiltScene
+
+if TYPE_CHECKING:
+    from distributed import Client
 
 TITLE = "series beyond small strain"
 
@@ -26,11 +30,14 @@ def sphere_radii(built: BuiltScene) -> list[float]:
     return sorted({float(t.radius) for t in built.scene.tools if t.contact == "local" and t.shape == "sphere"})
 
 
-def with_series(built: BuiltScene, progress: bool | Callable[[int, int], None] = False) -> BuiltScene:
+def with_series(
+    built: BuiltScene, progress: bool | Callable[[int, int], None] = False, dask: str | Client | None = None
+) -> BuiltScene:
     """Give hyperelastic bodies the series of their displacement below the spheres of a scene.
 
-    They are read from files beside the stores, or computed. Without them contacts follow a half-space of the material,
-    and the body below it stays linear. Bodies in motion and bodies with loads have none.
+    They are read from files beside the stores, or computed, with ``dask`` by the workers of a cluster. Without them
+    contacts follow a half-space of the material, and the body below it stays linear. Bodies in motion and bodies with
+    loads have none.
 
     Raises
     ------
@@ -39,7 +46,7 @@ def with_series(built: BuiltScene, progress: bool | Callable[[int, int], None] =
 
     """
     radii = sphere_radii(built)
-    return _with(built, lambda _: radii, lambda job: _computed(job, progress))
+    return _with(built, lambda _: radii, lambda job: _computed(job, progress, dask))
 
 
 def with_whole_series(built: BuiltScene, progress: bool | Callable[[int, int], None] = False) -> BuiltScene:
@@ -70,9 +77,11 @@ def stored_series(job: SeriesJob) -> _native.Series | None:
     return job.file().load()
 
 
-def _computed(job: SeriesJob, progress: bool | Callable[[int, int], None]) -> _native.Series:
+def _computed(
+    job: SeriesJob, progress: bool | Callable[[int, int], None], dask: str | Client | None = None
+) -> _native.Series:
     with progress_reporter(TITLE, progress) as report:
-        return job.compute(report)
+        return job.compute(report, dask)
 
 
 def _with(

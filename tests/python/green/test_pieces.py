@@ -97,11 +97,12 @@ def test_a_block_that_was_damaged_on_its_way_is_asked_for_again(times, body, tmp
             yield block, types.SimpleNamespace(status="finished", result=lambda timeout, got=(panel, checksum): got)
 
     monkeypatch.setattr(gathering, "spread", spread)
+    asked_for = (None, store.missing(), None, store.put, lambda: (store.done, store.columns), None)
     if times == gathering.MOST_DAMAGED:
-        with pytest.raises(palpate.ClusterError, match="block 3 of columns was damaged in transit 3 times"):
-            gathering._gather(None, (), width, store, None)
+        with pytest.raises(palpate.ClusterError, match="block 3 was damaged in transit 3 times"):
+            gathering._gather(*asked_for)
         return
-    gathering._gather(None, (), width, store, None)
+    gathering._gather(*asked_for)
     store.finish()
     assert asked.count(3) == times + 1
     whole = palpate.precompute(body, precision="f32", path=tmp_path / "whole.palpate")

@@ -197,3 +197,21 @@ def _child_of(pid: int) -> int:
             return int(found[0])
         time.sleep(0.05)
     raise AssertionError("no child has begun")
+
+
+def test_a_plan_counts_the_series(solved, job, whole):
+    body, _ = solved
+    planned = palpate.plan(body, path=job.store, radii=[RADIUS, 2 * RADIUS])
+    near, far = planned.series
+    assert (near.radius, near.places, near.missing) == (RADIUS, whole.places, whole.places)
+    assert far.places < near.places and 0 < far.seconds < near.seconds
+    assert str(planned).splitlines()[3] == str(near) and f"{whole.places} places" in str(near)
+    compute_some(job, 2)
+    assert palpate.plan(body, path=job.store, radii=[RADIUS]).series[0].missing == whole.places - job.file().load().done
+    job.compute()
+    (stored,) = palpate.plan(body, path=job.store, radii=[RADIUS]).series
+    # The header of the file has names and sums of its arrays.
+    assert 0 < job.file().path.stat().st_size - stored.size < 2000
+    assert (stored.missing, stored.seconds) == (0, 0.0) and str(stored).endswith("stored")
+    linear = palpate.Body(body.mesh, material=palpate.Material(10e3, 0.45), fixed=body.fixed_nodes)
+    assert palpate.plan(linear, radii=[RADIUS]).series == ()

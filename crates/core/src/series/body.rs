@@ -1,23 +1,22 @@
 //! A hyperelastic body, factorised at rest, and the series of its displacement under loads on patches.
 
+use std::sync::Arc;
+
 use faer::dyn_stack::MemBuffer;
 use faer::{MatMut, Par};
 use glam::DVec3;
 
 use super::internal::Elements;
 use crate::contact::local::StrainLaw;
-use crate::fem::{self, Isotropic, Supports};
+use crate::fem;
 use crate::green::Problem;
-use crate::mesh::TetMesh;
 use crate::solver::Factor;
 use crate::{Error, Result};
 
 /// A body with its factor.
-pub struct HyperelasticBody<'a> {
-    mesh: &'a TetMesh,
-    materials: &'a [Isotropic],
-    laws: &'a [StrainLaw],
-    supports: &'a Supports,
+pub struct HyperelasticBody {
+    problem: Arc<Problem>,
+    laws: Arc<[StrainLaw]>,
     factor: Factor,
 }
 
@@ -39,18 +38,18 @@ pub struct SeriesAt {
     pub fifth: f64,
 }
 
-impl<'a> HyperelasticBody<'a> {
+impl HyperelasticBody {
     /// Factorises the body.
     ///
     /// # Errors
     /// A law for each element is missing, or a body that is not held.
-    pub fn new(problem: &'a Problem, laws: &'a [StrainLaw]) -> Result<Self> {
-        let Problem { mesh, materials, supports, .. } = problem;
+    pub fn new(problem: Arc<Problem>, laws: Arc<[StrainLaw]>) -> Result<Self> {
+        let Problem { mesh, materials, supports, .. } = &*problem;
         if laws.len() != materials.len() {
             return Err(Error::Invalid(format!("{} laws for {} elements", laws.len(), materials.len())));
         }
         let factor = Factor::new(&fem::stiffness(mesh, materials), supports, Par::rayon(0))?;
-        Ok(Self { mesh, materials, laws, supports, factor })
+        Ok(Self { problem, laws, factor })
     }
 
     /// Memory of [`Self::series`] for so many loads.
@@ -60,8 +59,9 @@ impl<'a> HyperelasticBody<'a> {
 
     /// The series under each load.
     pub fn series(&self, loads: &[PatchLoad], memory: &mut MemBuffer) -> Vec<SeriesAt> {
-        let nodes = self.mesh.nodes.len();
-        let elements = Elements { mesh: self.mesh, materials: self.materials, laws: self.laws };
+        let Problem { mesh, materials, .. } = &*self.problem;
+        let nodes = mesh.nodes.len();
+        let elements = Elements { mesh, materials, laws: &self.laws };
         let mut first: Vec<_> = loads.iter().map(|load| load.forces(nodes)).collect();
         self.solve(&mut first, memory);
         let parts = |first: &Vec<DVec3>| {
@@ -94,13 +94,13 @@ impl<'a> HyperelasticBody<'a> {
         let mut right = Vec::with_capacity(rows * fields.len());
         for field in &*fields {
             let dofs: &[f64] = bytemuck::cast_slice(field);
-            right.extend(self.supports.free.iter().map(|&dof| dofs[dof as usize]));
+            right.extend(self.problem.supports.free.iter().map(|&dof| dofs[dof as usize]));
         }
         self.factor.solve_in_place(MatMut::from_column_major_slice_mut(&mut right, rows, fields.len()), memory);
         for (field, solution) in fields.iter_mut().zip(right.chunks_exact(rows)) {
             let dofs: &mut [f64] = bytemuck::cast_slice_mut(field);
             dofs.fill(0.0);
-            for (&dof, &value) in self.supports.free.iter().zip(solution) {
+            for (&dof, &value) in self.problem.supports.free.iter().zip(solution) {
                 dofs[dof as usize] = value;
             }
         }

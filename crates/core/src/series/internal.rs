@@ -36,6 +36,18 @@ impl Elements<'_> {
         fifth
     }
 
+    /// Points of quadrature, at each of which a series is summed.
+    pub fn points(&self) -> usize {
+        fn of<E: Tetrahedron<N>, const N: usize>(nodes: &[DVec3], tets: &[[u32; N]], laws: &[StrainLaw]) -> usize {
+            let summed = tets.iter().zip(laws).filter(|(_, law)| **law != StrainLaw::Linear);
+            summed.map(|(tet, _)| E::stiffness_rule(&positions(nodes, tet)).len()).sum()
+        }
+        match &self.mesh.tets {
+            Tets::Linear(tets) => of::<Tet4, 4>(&self.mesh.nodes, tets, self.laws),
+            Tets::Quadratic(tets) => of::<Tet10, 10>(&self.mesh.nodes, tets, self.laws),
+        }
+    }
+
     /// Calls `use_stress` at each point of quadrature with the stress by order, the displacement gradients, the point's volume,
     /// the element's nodes and the gradients of their shape functions. An empty field is zero.
     fn each_stress(&self, fields: [&[DVec3]; 2], use_stress: impl FnMut(&[DMat3], [&DMat3; 2], f64, &[u32], &[DVec3])) {

@@ -50,6 +50,16 @@ impl Layout {
         self.places.len().div_ceil(BLOCK)
     }
 
+    /// Hash of the places: blocks of the same places have the same numbers.
+    pub fn order(&self) -> [u8; 32] {
+        let mut hash = blake3::Hasher::new();
+        for &place in &self.places {
+            let Side { position, normal } = self.sides[place as usize];
+            hash.update(bytemuck::cast_slice(&[position.to_array(), normal.to_array()]));
+        }
+        *hash.finalize().as_bytes()
+    }
+
     /// Distance of a point from the nearest place of a block, m.
     fn distance(&self, block: usize, point: DVec3) -> f64 {
         let places = &self.places[BLOCK * block..self.places.len().min(BLOCK * (block + 1))];
@@ -76,6 +86,11 @@ impl Series {
         self.known.iter().enumerate().filter(|(_, known)| **known).map(|(block, _)| size(block)).sum()
     }
 
+    /// Fields of a block.
+    pub fn block(&self, block: usize) -> &[SeriesFields] {
+        &self.fields[BLOCK * block..self.fields.len().min(BLOCK * (block + 1))]
+    }
+
     /// Adds a block.
     pub fn set(&mut self, block: usize, fields: &[SeriesFields]) {
         self.fields[BLOCK * block..][..fields.len()].copy_from_slice(fields);
@@ -98,8 +113,7 @@ impl Series {
         has.then(|| {
             let mut part = Self::empty(self.layout.clone());
             for block in (0..known.len()).filter(|&block| known[block]) {
-                let end = self.fields.len().min(BLOCK * (block + 1));
-                part.set(block, &self.fields[BLOCK * block..end]);
+                part.set(block, self.block(block));
             }
             part
         })

@@ -1,11 +1,14 @@
 //! Places spread over a surface, at which a series is computed in blocks.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 use rayon::prelude::*;
 
 use super::body::{HyperelasticBody, PatchLoad};
 use super::coefficients::coefficients;
 use super::half_space::half_space_terms;
+use super::internal::Elements;
 use super::known::{BLOCK, Layout, SAME_SIDE, Side};
 use crate::Result;
 use crate::contact::local::StrainLaw;
@@ -32,21 +35,21 @@ struct Place {
 }
 
 /// Places chosen on a surface for a tool, along a Hilbert curve: the places of a block are close together.
-pub struct SeriesPlan<'a> {
-    problem: &'a Problem,
-    laws: &'a [StrainLaw],
+pub struct SeriesPlan {
+    problem: Arc<Problem>,
+    laws: Arc<[StrainLaw]>,
     smooth: SmoothSurface,
     places: Vec<Place>,
     spacing: f64,
     elements: (Vec<usize>, Vec<(u32, u8)>),
 }
 
-impl<'a> SeriesPlan<'a> {
+impl SeriesPlan {
     /// Chooses the places for tools of `radius`, m.
     ///
     /// # Errors
     /// A surface that is not the mesh's.
-    pub fn new(problem: &'a Problem, laws: &'a [StrainLaw], radius: f64) -> Result<Self> {
+    pub fn new(problem: Arc<Problem>, laws: Arc<[StrainLaw]>, radius: f64) -> Result<Self> {
         let surface = problem.surface()?;
         let smooth = SmoothSurface::new(&surface);
         let spacing = SPACING * radius;
@@ -67,7 +70,7 @@ impl<'a> SeriesPlan<'a> {
         let memory = || PatchScratch::new(&surface);
         let places: Vec<Option<Place>> = ordered.into_par_iter().map_init(memory, place).collect();
         let places = places.into_iter().flatten().collect();
-        let elements = elements_of_nodes(problem);
+        let elements = elements_of_nodes(&problem);
         Ok(Self { problem, laws, places, smooth, spacing, elements })
     }
 
@@ -78,16 +81,22 @@ impl<'a> SeriesPlan<'a> {
         Layout { sides: sides.collect(), places, spacing: self.spacing }
     }
 
+    /// Points of quadrature of the body, at each of which the series of a place is summed.
+    pub fn points(&self) -> usize {
+        let Problem { mesh, materials, .. } = &*self.problem;
+        Elements { mesh, materials, laws: &self.laws }.points()
+    }
+
     /// The factor that all blocks are solved with.
     ///
     /// # Errors
     /// A body that is not held.
-    pub fn factorize(&self) -> Result<HyperelasticBody<'a>> {
-        HyperelasticBody::new(self.problem, self.laws)
+    pub fn factorize(&self) -> Result<HyperelasticBody> {
+        HyperelasticBody::new(self.problem.clone(), self.laws.clone())
     }
 
     /// Coefficients at the places of a block.
-    pub fn solve(&self, body: &HyperelasticBody<'_>, block: usize) -> Vec<SeriesFields> {
+    pub fn solve(&self, body: &HyperelasticBody, block: usize) -> Vec<SeriesFields> {
         let places = &self.places[BLOCK * block..self.places.len().min(BLOCK * (block + 1))];
         let loads: Vec<PatchLoad> = places.iter().map(|place| place.load.clone()).collect();
         let found = body.series(&loads, &mut body.scratch(loads.len()));

@@ -10,7 +10,7 @@ use super::known::{Layout, Series, Side};
 use super::places::SeriesPlan;
 use crate::arrays_file::{ArraysFile, ArraysKind};
 use crate::contact::local::{SERIES_FIELDS, StrainLaw};
-use crate::green::{Problem, Progress};
+use crate::green::Progress;
 use crate::{Error, Result};
 
 /// Version of the computation and of the file's layout; part of the key.
@@ -74,15 +74,11 @@ impl SeriesFile {
     /// A body that is not held, or an interruption by `progress`, which is called with the known places and all of them.
     pub fn compute(
         &self,
-        (problem, laws): (&Problem, &[StrainLaw]),
-        radius: f64,
+        plan: &SeriesPlan,
         near: &(dyn Fn() -> Option<DVec3> + Sync),
         progress: Progress<'_>,
     ) -> Result<Series> {
-        let plan = SeriesPlan::new(problem, laws, radius)?;
-        let (layout, stored) = (plan.layout(), self.load());
-        let fitting = stored.filter(|stored| stored.layout == layout);
-        let mut series = fitting.unwrap_or_else(|| Series::empty(layout));
+        let mut series = self.resume(plan.layout());
         if series.is_complete() {
             return Ok(series);
         }
@@ -105,7 +101,24 @@ impl SeriesFile {
         Ok(series)
     }
 
-    fn write(&self, series: &Series) -> Result<()> {
+    /// What is stored of a series with such places; empty if that is nothing.
+    pub fn resume(&self, layout: Layout) -> Series {
+        let fitting = self.load().filter(|stored| stored.layout == layout);
+        fitting.unwrap_or_else(|| Series::empty(layout))
+    }
+
+    /// Bytes of the file of a series with such places, without its header.
+    pub fn size(layout: &Layout) -> usize {
+        let Layout { sides, places, .. } = layout;
+        let numbers = (SERIES_FIELDS + 1) * places.len() + 6 * sides.len() + layout.blocks() + 1;
+        numbers * size_of::<f64>()
+    }
+
+    /// Writes a series, beside and then renamed.
+    ///
+    /// # Errors
+    /// The operating system's.
+    pub fn write(&self, series: &Series) -> Result<()> {
         let Series { layout, fields, known } = series;
         let sides: Vec<f64> =
             layout.sides.iter().flat_map(|side| [side.position.to_array(), side.normal.to_array()].concat()).collect();
