@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import splu
 
-from benches.strain.axisymmetric import Cylinder, Sphere, graded
-from benches.strain.materials import ReducedPolynomial
+import palpate
+from benches.strain.axisymmetric import Cylinder, Sphere, forces, graded
+from benches.strain.materials import NeoHookean, ReducedPolynomial
 from benches.strain.patch_series import patch_weights
 from benches.strain.solid import Solid
+from palpate.validation.verify.contact.closed_forms import sneddon_sphere
 from palpate.validation.verify.grids import box
 
 MATERIAL = ReducedPolynomial(10e3, 0.45)
@@ -129,3 +131,23 @@ def test_calculix_has_the_contact_of_a_sphere_on_ten_node_elements(tmp_path):
     u = calculix(tmp_path, mesh.nodes, ("C3D10", mesh.tets), fixed, loads)
     touching = np.linalg.norm(loads, axis=1) > 1e-3 * np.linalg.norm(loads, axis=1).max()
     assert np.abs(u[touching] - body.u[touching]).max() < ALLOWED * 0.003
+
+
+@pytest.mark.slow
+def test_the_law_of_a_half_space_sees_five_per_cent_of_its_first_coefficient():
+    """Beside full solutions on other elements than those of the table; the law adds 5 % to Sneddon's force here."""
+    ratio, depths = 0.2, np.array([0.15, 0.3, 0.45, 0.6])
+    # 1000 radii wide: the force is within 0.1 % of a half-space's.
+    r, z = graded(1 / 18, 1.2, 1.5, 1000.0), graded(1 / 18, 0.6, 1.5, 1000.0)
+    full = forces(Cylinder(r, -z, NeoHookean(1.0, ratio)), Sphere(1.0), depths)[1:]
+    modulus, s = 1.0 / (1.0 - ratio**2), np.sqrt(depths[1:])
+    linear = np.array([sneddon_sphere(depth, 1.0, modulus)[0] for depth in depths[1:]])
+
+    def error(factor: float) -> np.ndarray:
+        first, second, third = palpate.Material(1.0, ratio, law="neo-hookean").strain_terms
+        law = linear + 4 / 3 * modulus * s**3 * (factor * first * s + second * s**2 + third * s**3)
+        return np.abs(law / full - 1.0)
+
+    assert (linear / full < 0.96).all()
+    assert (error(1.0) < 2e-3).all(), error(1.0)
+    assert (error(1.05) > 2e-3).all() and (error(0.95) > 2e-3).all()
