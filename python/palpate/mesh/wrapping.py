@@ -101,7 +101,7 @@ class Wrapping:
             within = faces_between(mesh), self.inner.project
         if self.job.element == "quadratic":
             mesh = curve(mesh, project, within)
-        self._report(mesh, wrap, extent)
+        self._report(mesh, wrap)
         return mesh
 
     def _run(self, origin: np.ndarray, extent: float, size: float) -> dict[str, np.ndarray]:
@@ -173,7 +173,7 @@ class Wrapping:
                     f"{self.name}: the surface {self.reason}; it was wrapped, and NETGEN cannot fill the wrap. {advice}"
                 ) from None
 
-    def _report(self, mesh: TetMesh, wrap: _Wrapped, extent: float) -> None:
+    def _report(self, mesh: TetMesh, wrap: _Wrapped) -> None:
         """Warn of what was done and lost, a line each, or refuse the mesh."""
         loss = 1.0 - mesh.volume / wrap.volume
         gap = float(distances(mesh, wrap.points).max()) if len(wrap.points) else 0.0

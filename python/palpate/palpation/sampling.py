@@ -9,7 +9,6 @@ are told apart. The same body gives the same points.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,8 +20,6 @@ from palpate.palpation.sides import Side
 MOST_POINTS = 5000
 # Candidates on a curved side lie so many times closer than its points; steps of Lloyd's algorithm.
 FINER, LLOYD_STEPS = 6, 15
-
-Predicate = Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)

@@ -88,7 +88,7 @@ def smooth_boundary(mask: np.ndarray, affine: np.ndarray) -> Boundary:
     while level_set is None and width > least:
         level_set = _at_width(share, affine, wanted, width)
         width = width if level_set else width / 2
-    vertices, faces, field, placed, volume = level_set or _any_value(share, affine, wanted)
+    vertices, faces, field, placed, volume = level_set or _any_value(share, affine)
     return Boundary(vertices, faces, field, placed, wanted, volume, width if level_set else 0.0, at_edge)
 
 
@@ -209,7 +209,7 @@ def _area(level_set: _LevelSet) -> float:
     return 0.5 * float(np.linalg.norm(sides, axis=1).sum())
 
 
-def _any_value(share: np.ndarray, affine: np.ndarray, wanted: float) -> _LevelSet:
+def _any_value(share: np.ndarray, affine: np.ndarray) -> _LevelSet:
     """Boundary of what is thinner than a few voxels: halfway between voxels, of whatever volume."""
     values, placed = np.pad(share, 2), _shifted(affine, np.full(3, -2))
     # Pooled voxels may all be less than half full.
