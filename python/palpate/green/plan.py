@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 FACTOR_EFFICIENCY, COLUMN_EFFICIENCY = 0.7, 0.9
 # Operations of a product of matrices that take as long as one of a sweep with eight columns, and as the sum of a series
 # at a point of quadrature: of the built-in bodies and the examples.
-SWEEP_COST, POINT_COST = 4.0, 5e4
+SWEEP_COST, POINT_COST = 4.0, 2.2e4
 # Time over which the product is repeated, s.
 CALIBRATION = 0.1
 

@@ -64,22 +64,13 @@ impl HyperelasticBody {
         let elements = Elements { mesh, materials, laws: &self.laws };
         let mut first: Vec<_> = loads.iter().map(|load| load.forces(nodes)).collect();
         self.solve(&mut first, memory);
-        let parts = |first: &Vec<DVec3>| {
-            let mut forces = vec![DVec3::ZERO; nodes];
-            elements.second_order(first, &mut forces);
-            forces.iter_mut().for_each(|force| *force = -*force);
-            forces
-        };
-        let mut second: Vec<_> = first.iter().map(parts).collect();
+        let mut second = vec![vec![DVec3::ZERO; nodes]; loads.len()];
+        elements.second_order(&first, &mut second);
+        second.iter_mut().flatten().for_each(|force| *force = -*force);
         self.solve(&mut second, memory);
-        let mut fifth = vec![0.0; loads.len()];
-        let mut third = Vec::with_capacity(loads.len());
-        for ((first, second), fifth) in first.iter().zip(&second).zip(&mut fifth) {
-            let mut forces = vec![DVec3::ZERO; nodes];
-            *fifth = elements.third_order(first, second, &mut forces);
-            forces.iter_mut().for_each(|force| *force = -*force);
-            third.push(forces);
-        }
+        let mut third = vec![vec![DVec3::ZERO; nodes]; loads.len()];
+        let fifth = elements.third_order(&first, &second, &mut third);
+        third.iter_mut().flatten().for_each(|force| *force = -*force);
         self.solve(&mut third, memory);
         let at = |(k, load): (usize, &PatchLoad)| SeriesAt {
             displacements: [&first[k], &second[k], &third[k]].map(|field| load.mean_displacement(field)),

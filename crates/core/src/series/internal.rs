@@ -19,19 +19,19 @@ pub struct Elements<'a> {
 }
 
 impl Elements<'_> {
-    /// `r_2` of the field `u_1`, added to `forces`, N.
-    pub fn second_order(&self, first: &[DVec3], forces: &mut [DVec3]) {
-        self.each_stress([first, &[]], |orders, _, weight, nodes, slopes| {
-            add_forces(&orders[2], weight, (nodes, slopes), forces);
-        });
+    /// `r_2` of fields `u_1`, added to the `forces` of each, N.
+    pub fn second_order(&self, first: &[Vec<DVec3>], forces: &mut [Vec<DVec3>]) {
+        let fields: Vec<_> = first.iter().map(|first| [&first[..], &[]]).collect();
+        self.each_stress(&fields, |load, [_, _, second], _, at| at.add_forces(second, &mut forces[load]));
     }
 
-    /// `r_3` of the fields `u_1`, `u_2`, added to `forces`, N; returns `U_5`.
-    pub fn third_order(&self, first: &[DVec3], second: &[DVec3], forces: &mut [DVec3]) -> f64 {
-        let mut fifth = 0.0;
-        self.each_stress([first, second], |orders, [h1, h2], weight, nodes, slopes| {
-            add_forces(&orders[3], weight, (nodes, slopes), forces);
-            fifth -= weight * (contraction(&orders[4], h1) + 2.0 * contraction(&orders[3], h2)) / 5.0;
+    /// `r_3` of fields `u_1`, `u_2`, added to the `forces` of each, N; returns `U_5` of each.
+    pub fn third_order(&self, first: &[Vec<DVec3>], second: &[Vec<DVec3>], forces: &mut [Vec<DVec3>]) -> Vec<f64> {
+        let fields: Vec<_> = first.iter().zip(second).map(|(first, second)| [&first[..], &second[..]]).collect();
+        let mut fifth = vec![0.0; first.len()];
+        self.each_stress(&fields, |load, [_, _, _, third, fourth], [h1, h2], at| {
+            at.add_forces(third, &mut forces[load]);
+            fifth[load] -= at.weight * (contraction(fourth, h1) + 2.0 * contraction(third, h2)) / 5.0;
         });
         fifth
     }
@@ -48,20 +48,24 @@ impl Elements<'_> {
         }
     }
 
-    /// Calls `use_stress` at each point of quadrature with the stress by order, the displacement gradients, the point's volume,
-    /// the element's nodes and the gradients of their shape functions. An empty field is zero.
-    fn each_stress(&self, fields: [&[DVec3]; 2], use_stress: impl FnMut(&[DMat3], [&DMat3; 2], f64, &[u32], &[DVec3])) {
+    /// Calls `use_stress` at each point of quadrature for each load, by its rank, with the first `O` coefficients of the stress and the
+    /// displacement gradients. An empty field is zero.
+    fn each_stress<const O: usize>(
+        &self,
+        fields: &[[&[DVec3]; 2]],
+        use_stress: impl FnMut(usize, &[DMat3; O], [&DMat3; 2], &At<'_>),
+    ) {
         match &self.mesh.tets {
-            Tets::Linear(tets) => self.each_stress_of::<Tet4, 4>(tets, fields, use_stress),
-            Tets::Quadratic(tets) => self.each_stress_of::<Tet10, 10>(tets, fields, use_stress),
+            Tets::Linear(tets) => self.each_stress_of::<Tet4, 4, O>(tets, fields, use_stress),
+            Tets::Quadratic(tets) => self.each_stress_of::<Tet10, 10, O>(tets, fields, use_stress),
         }
     }
 
-    fn each_stress_of<E: Tetrahedron<N>, const N: usize>(
+    fn each_stress_of<E: Tetrahedron<N>, const N: usize, const O: usize>(
         &self,
         tets: &[[u32; N]],
-        fields: [&[DVec3]; 2],
-        mut use_stress: impl FnMut(&[DMat3], [&DMat3; 2], f64, &[u32], &[DVec3]),
+        fields: &[[&[DVec3]; 2]],
+        mut use_stress: impl FnMut(usize, &[DMat3; O], [&DMat3; 2], &At<'_>),
     ) {
         for (e, nodes) in tets.iter().enumerate() {
             if self.laws[e] == StrainLaw::Linear {
@@ -70,25 +74,37 @@ impl Elements<'_> {
             let places = positions(&self.mesh.nodes, nodes);
             for point in E::stiffness_rule(&places) {
                 let (slopes, weight) = gradients::<E, N>(&places, point);
-                let gradient = |field: &[DVec3]| -> DMat3 {
-                    if field.is_empty() {
-                        return DMat3::ZERO;
-                    }
-                    nodes.iter().zip(&slopes).map(|(&node, &slope)| outer(field[node as usize], slope)).sum()
-                };
-                let [h1, h2] = fields.map(gradient);
-                let by_order: Gradients = [h1, h2, DMat3::ZERO, DMat3::ZERO];
-                let orders = stress(&self.laws[e], &self.materials[e], &by_order);
-                use_stress(&orders, [&h1, &h2], weight, nodes, &slopes);
+                let at = At { nodes, slopes: &slopes, weight };
+                for (load, &fields) in fields.iter().enumerate() {
+                    let by_order: Gradients = fields.map(|field| at.gradient(field));
+                    let orders = stress(&self.laws[e], &self.materials[e], &by_order);
+                    use_stress(load, &orders, by_order.each_ref(), &at);
+                }
             }
         }
     }
 }
 
-/// Adds the forces of a stress at one point to those of the element's nodes.
-fn add_forces(stress: &DMat3, weight: f64, (nodes, slopes): (&[u32], &[DVec3]), forces: &mut [DVec3]) {
-    let weighted = *stress * weight;
-    for (&node, &slope) in nodes.iter().zip(slopes) {
-        forces[node as usize] += weighted * slope;
+/// A point of quadrature: the element's nodes, the gradients of their shape functions, and the point's volume.
+struct At<'a> {
+    nodes: &'a [u32],
+    slopes: &'a [DVec3],
+    weight: f64,
+}
+
+impl At<'_> {
+    fn gradient(&self, field: &[DVec3]) -> DMat3 {
+        if field.is_empty() {
+            return DMat3::ZERO;
+        }
+        self.nodes.iter().zip(self.slopes).map(|(&node, &slope)| outer(field[node as usize], slope)).sum()
+    }
+
+    /// Adds the forces of a stress to those of the element's nodes.
+    fn add_forces(&self, stress: &DMat3, forces: &mut [DVec3]) {
+        let weighted = *stress * self.weight;
+        for (&node, &slope) in self.nodes.iter().zip(self.slopes) {
+            forces[node as usize] += weighted * slope;
+        }
     }
 }

@@ -12,17 +12,19 @@
 
 use glam::DMat3;
 
-use super::truncated::{Matrix, ORDERS, Scalar};
+use super::truncated::{DEGREE, Matrix};
 use crate::contact::local::StrainLaw;
 use crate::fem::Isotropic;
 
-/// Displacement gradients by order, from order 1 on.
-pub type Gradients = [DMat3; ORDERS - 1];
+/// Displacement gradients of orders 1 and 2.
+pub type Gradients = [DMat3; DEGREE];
 
-/// Coefficients of the stress, Pa, by order.
-pub fn stress(law: &StrainLaw, material: &Isotropic, gradients: &Gradients) -> [DMat3; ORDERS] {
-    let [first, second, third, fourth] = *gradients;
-    let deformation = Matrix([DMat3::IDENTITY, first, second, third, fourth]);
+/// The first `N` coefficients of the stress, Pa, from order 0 on.
+pub fn stress<const N: usize>(law: &StrainLaw, material: &Isotropic, gradients: &Gradients) -> [DMat3; N] {
+    let by_order = |constant: DMat3, of: &dyn Fn(DMat3) -> DMat3| {
+        std::array::from_fn(|n| if n == 0 { constant } else { gradients.get(n - 1).map_or(DMat3::ZERO, |&h| of(h)) })
+    };
+    let deformation = Matrix(by_order(DMat3::IDENTITY, &|h| h));
     let (lambda, mu) = material.lame();
     match *law {
         StrainLaw::Linear => {
@@ -30,7 +32,7 @@ pub fn stress(law: &StrainLaw, material: &Isotropic, gradients: &Gradients) -> [
                 let strain = (h + h.transpose()) * 0.5;
                 strain * (2.0 * mu) + DMat3::IDENTITY * (lambda * (h.x_axis.x + h.y_axis.y + h.z_axis.z))
             };
-            [DMat3::ZERO, hooke(first), hooke(second), hooke(third), hooke(fourth)]
+            by_order(DMat3::ZERO, &hooke)
         }
         StrainLaw::NeoHookean => neo_hookean(&deformation, lambda, mu),
         StrainLaw::MooneyRivlin { share } => {
@@ -49,7 +51,7 @@ fn bulk(lambda: f64, mu: f64) -> f64 {
     lambda + 2.0 / 3.0 * mu
 }
 
-fn neo_hookean(deformation: &Matrix, lambda: f64, mu: f64) -> [DMat3; ORDERS] {
+fn neo_hookean<const N: usize>(deformation: &Matrix<N>, lambda: f64, mu: f64) -> [DMat3; N] {
     let inverse = deformation.inverse();
     let log = deformation.log_determinant(&inverse);
     let against = inverse.transposed();
@@ -65,7 +67,7 @@ struct Polynomial {
     c30: f64,
 }
 
-fn reduced_polynomial(deformation: &Matrix, constants: &Polynomial, bulk: f64) -> [DMat3; ORDERS] {
+fn reduced_polynomial<const N: usize>(deformation: &Matrix<N>, constants: &Polynomial, bulk: f64) -> [DMat3; N] {
     let inverse = deformation.inverse();
     let log = deformation.log_determinant(&inverse);
     let against = inverse.transposed();
@@ -84,7 +86,7 @@ fn reduced_polynomial(deformation: &Matrix, constants: &Polynomial, bulk: f64) -
         whole = whole.plus(&second.scaled_by(&shrunk.times(&shrunk)).scaled(constants.c01));
     }
     let volume = log.exponential();
-    let pressure: Scalar = volume.shifted(-1.0).times(&volume).scaled(bulk);
+    let pressure = volume.shifted(-1.0).times(&volume).scaled(bulk);
     whole.plus(&against.scaled_by(&pressure)).0
 }
 
@@ -97,7 +99,7 @@ mod tests {
     fn gradients() -> Gradients {
         let column = |a: f64| DVec3::new(0.3 + a, -0.2 * a, 0.15 - a);
         let matrix = |a: f64| DMat3::from_cols(column(a), column(0.4 * a), column(-0.7 * a + 0.1));
-        [matrix(0.5), matrix(-0.3), DMat3::ZERO, DMat3::ZERO]
+        [matrix(0.5), matrix(-0.3)]
     }
 
     /// Energy density as the authors print it, Pa.
@@ -122,9 +124,9 @@ mod tests {
         let material = Isotropic::new(3.0, 0.4, 0.0).expect("a material");
         let (yeoh, mooney) = (StrainLaw::Yeoh { quadratic: 0.7, cubic: 0.4 }, StrainLaw::MooneyRivlin { share: 0.3 });
         for law in [StrainLaw::NeoHookean, mooney, yeoh] {
-            let series = stress(&law, &material, &gradients());
+            let series: [DMat3; 5] = stress(&law, &material, &gradients());
             let rest = |s: f64| {
-                let [first, second, ..] = gradients();
+                let [first, second] = gradients();
                 let f = DMat3::IDENTITY + first * s + second * (s * s);
                 let sum: DMat3 = series.iter().enumerate().map(|(k, &p)| p * s.powi(k as i32)).sum();
                 let (mut most, h) = (0.0f64, 1e-5);
@@ -147,10 +149,10 @@ mod tests {
     #[test]
     fn the_first_order_is_hookes_law() {
         let material = Isotropic::new(3.0, 0.4, 0.0).expect("a material");
-        let linear = stress(&StrainLaw::Linear, &material, &gradients())[1];
+        let linear = stress::<2>(&StrainLaw::Linear, &material, &gradients())[1];
         let (yeoh, mooney) = (StrainLaw::Yeoh { quadratic: 0.7, cubic: 0.4 }, StrainLaw::MooneyRivlin { share: 0.3 });
         for law in [StrainLaw::NeoHookean, mooney, yeoh] {
-            let first = stress(&law, &material, &gradients());
+            let first: [DMat3; 2] = stress(&law, &material, &gradients());
             assert!((first[1] - linear).abs_diff_eq(DMat3::ZERO, 1e-14) && first[0].abs_diff_eq(DMat3::ZERO, 1e-14));
         }
     }
