@@ -6,7 +6,7 @@ use std::thread::JoinHandle;
 
 #[cfg(feature = "strain")]
 use palpate_core::simulation::StrainWatch;
-use palpate_core::simulation::{MAX_BODIES, Model, PreviousRanks};
+use palpate_core::simulation::{MAX_BODIES, Model};
 #[cfg(feature = "strain")]
 use palpate_core::strain::StrainMeasure;
 use palpate_core::{Error, Result};
@@ -37,12 +37,6 @@ impl StrainPreparer {
         }
     }
 
-    /// For another model, with the measures of the bodies that stay.
-    pub fn for_model(&self, model: &Arc<Model>, previous_ranks: &PreviousRanks) -> Self {
-        let measures = previous_ranks.bodies.map(|old| self.measures.get(old?).cloned().flatten());
-        Self { model: model.clone(), measures }
-    }
-
     /// Whether the strain of each body can be limited.
     pub(crate) fn limitable(&self) -> [bool; MAX_BODIES] {
         self.measures.each_ref().map(Option::is_some)
@@ -61,11 +55,6 @@ impl StrainPreparer {
 impl StrainPreparer {
     /// Knows none.
     pub fn new(_model: &Arc<Model>) -> Self {
-        Self {}
-    }
-
-    /// The same.
-    pub fn for_model(&self, _model: &Arc<Model>, _previous_ranks: &PreviousRanks) -> Self {
         Self {}
     }
 

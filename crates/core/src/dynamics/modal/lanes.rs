@@ -83,8 +83,3 @@ pub fn grouped(x: &[f64]) -> Vec<Lanes> {
         })
         .collect()
 }
-
-/// The first `count` numbers of groups.
-pub fn flat(groups: &[Lanes], count: usize) -> Vec<f64> {
-    groups.iter().flat_map(|g| g.0).take(count).collect()
-}

@@ -7,7 +7,7 @@
 use pulp::Arch;
 
 use super::kernels::{AddRows, Correct, Dot, FreeStep, Predict};
-use super::lanes::{LANES, Lanes, flat, grouped};
+use super::lanes::{LANES, Lanes, grouped};
 use crate::dynamics::integration::Integration;
 use crate::dynamics::scheme::Rayleigh;
 use crate::memory::Ranges;
@@ -109,11 +109,6 @@ impl ModalModel {
         })
     }
 
-    /// Number of modes.
-    pub fn modes(&self) -> usize {
-        self.modes
-    }
-
     /// Number of rows of the shapes.
     pub fn rows(&self) -> usize {
         self.rows
@@ -209,10 +204,5 @@ impl ModalModel {
                 Lanes(std::array::from_fn(of))
             })
             .collect()
-    }
-
-    /// Modal numbers without the filling.
-    pub fn flat(&self, x: &[Lanes]) -> Vec<f64> {
-        flat(x, self.modes)
     }
 }

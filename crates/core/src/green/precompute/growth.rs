@@ -29,9 +29,6 @@ pub struct Growth<'a> {
 }
 
 impl Growth<'_> {
-    /// All columns at once.
-    pub const NONE: Growth<'static> = Growth { first: &[], next: &|| None, ready: &|_| {} };
-
     /// Touchable nodes by stages.
     pub fn stages(&self, problem: &Problem) -> Vec<Vec<u32>> {
         stages(&positions(problem), &problem.touch, self.first)
