@@ -83,7 +83,8 @@ demo: $(VENV)/.installed $(PAGE)
 
 # Two processes: much of the time goes into waiting for browsers, meshers and servers; tests/python/conftest.py gives what
 # each of them takes on, and in which order.
-PYTEST := $(BIN)/python -m pytest --quiet --numprocesses 2 --dist loadgroup --no-loadscope-reorder
+# OpenBLAS on one thread each: its threads wait for one another by spinning, which took two thirds of the tests of modes.
+PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --quiet --numprocesses 2 --dist loadgroup --no-loadscope-reorder
 test: | check-tools
 	@# npm and pip wait for downloads while cargo compiles.
 	cargo test --release --quiet --workspace --no-run & \

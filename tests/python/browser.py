@@ -11,9 +11,13 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
 
 # Without a window of its own a browser starts faster, and draws a picture in half of the processor's time.
 CHROMIUM = shutil.which("chromium-headless-shell") or shutil.which("chromium") or "/usr/bin/chromium"
@@ -61,6 +65,36 @@ class Program:
             self.process.send_signal(signal.SIGINT)
         self.process.stdout.close()
         return self.process.wait(20)
+
+
+class SharedBrowser:
+    """A browser and the demo of the paper's liver: each is started when a test first asks for it."""
+
+    def __init__(self, cache: Path):
+        self._cache = cache
+        self._chromium: Browser | None = None
+        self._program: Program | None = None
+        self._open = contextlib.ExitStack()
+
+    def chromium(self) -> Browser:
+        from playwright.sync_api import sync_playwright
+
+        if self._chromium is None:
+            playwright = self._open.enter_context(sync_playwright())
+            self._chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+            self._open.callback(self._chromium.close)
+        return self._chromium
+
+    def program(self) -> Program:
+        if self._program is None:
+            self._program = Program(self._cache, "liver", "--paper")
+        return self._program
+
+    def close(self) -> None:
+        """End both; a test that asks again starts them anew. The program ends cleanly by Ctrl-C."""
+        program, self._program, self._chromium = self._program, None, None
+        self._open.close()
+        assert program is None or program.stop() == 0
 
 
 # A browser in which someone has opened More before; a choice of the test itself stays.

@@ -12,6 +12,8 @@ from palpate.mesh import TetMesh
 
 # Standard error of the process itself, whatever captures that of a test.
 STDERR = pytest.StashKey()
+# What tests of the page share.
+SHARED_BROWSER = pytest.StashKey()
 
 
 def pytest_addoption(parser):
@@ -51,6 +53,16 @@ def pytest_runtest_protocol(item):
         return (yield)
     finally:
         faulthandler.cancel_dump_traceback_later()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item):
+    """Close the browser before the first test that needs none: its event loop is that of the thread, and no other can
+    run, and its program computes a thousand ticks a second.
+    """
+    shared = item.config.stash.get(SHARED_BROWSER, None)
+    if shared is not None and not item.get_closest_marker("browser"):
+        shared.close()
 
 
 def thin_campaigns(config, items) -> None:
@@ -221,26 +233,25 @@ def shared_cache(cache, monkeypatch, private_cache):
     monkeypatch.setenv("XDG_CACHE_HOME", str(cache))
 
 
-@pytest.fixture(scope="module")
-def chromium():
-    """Of a module: while it is open, its event loop is that of the thread, and no other can run."""
-    from browser import CHROMIUM, FLAGS
-    from playwright.sync_api import sync_playwright
+@pytest.fixture(scope="session")
+def shared_browser(cache, request):
+    """A browser and a program for all tests of the page, which come first."""
+    from browser import SharedBrowser
 
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        yield browser
-        browser.close()
+    request.config.stash[SHARED_BROWSER] = shared = SharedBrowser(cache)
+    yield shared
+    shared.close()
 
 
 @pytest.fixture(scope="module")
-def program(cache):
+def chromium(shared_browser):
+    return shared_browser.chromium()
+
+
+@pytest.fixture(scope="module")
+def program(shared_browser):
     """The demo of the paper's liver, with a page; it ends cleanly by Ctrl-C."""
-    from browser import Program
-
-    started = Program(cache, "liver", "--paper")
-    yield started
-    assert started.stop() == 0
+    return shared_browser.program()
 
 
 @pytest.fixture

@@ -46,11 +46,10 @@ def test_meshes_solves_and_presses(environment, tmp_path):
         ["cache", "list"],
         ["demo", "--paper", "--headless", "1"],
     ):
-        ended = subprocess.run(
-            [sys.executable, "-m", "palpate", *map(str, words)], capture_output=True, text=True, env=environment
-        )
+        command = [sys.executable, "-m", "palpate", *map(str, words)]
+        ended = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, env=environment)
         assert ended.returncode == 0, (words, ended.stderr)
-    assert "N" in ended.stdout
+    assert "N" in ended.stdout and (tmp_path / "liver-paper.csv").exists()
 
 
 @pytest.mark.slow

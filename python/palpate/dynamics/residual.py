@@ -12,8 +12,8 @@ import numpy as np
 import scipy
 
 from palpate import _native
-from palpate.dynamics.basis import ModalBasis
-from palpate.dynamics.matrices import Matrices, native
+from palpate.dynamics.basis import ZERO_EIGENVALUE, ModalBasis
+from palpate.dynamics.matrices import Matrices, native, start_vector
 from palpate.errors import BodyError
 
 
@@ -39,12 +39,24 @@ class Residual:
         pinned = order[: self._rigid.shape[1]]
         self._kept = np.setdiff1d(np.arange(len(self._free)), pinned)
         fixed = np.union1d(matrices.fixed, self._free[pinned])
+        lacking = f"a truncated basis needs all rigid motions of the body; the first {len(basis)} modes lack some"
         try:
             self._factor = _native.SparseFactor(native(matrices.stiffness), fixed.tolist())
         except BodyError:
-            raise BodyError(
-                f"a truncated basis needs all rigid motions of the body; the first {len(basis)} modes lack some"
-            ) from None
+            raise BodyError(lacking) from None
+        if rigid.any() and self._is_loose(matrices):
+            raise BodyError(lacking)
+
+    def _is_loose(self, matrices: Matrices) -> bool:
+        """Whether the pinned body can still move as a rigid one: round-off may give a singular matrix a factor.
+
+        A step of inverse iteration then ends at that motion, whose Rayleigh quotient is round-off.
+        """
+        moved = np.zeros(len(self._free))
+        moved[self._kept] = self._factor.solve(start_vector(len(self._kept)))
+        quotient = (moved @ (matrices.free_stiffness @ moved)) / (moved @ (matrices.free_mass @ moved))
+        scale = (matrices.free_stiffness.diagonal() / matrices.free_mass.diagonal()).max()
+        return bool(quotient < ZERO_EIGENVALUE * scale)
 
     def answer(self, forces: np.ndarray) -> np.ndarray:
         """Displacements (3n), m, that the modes leave out under forces (3n), N."""

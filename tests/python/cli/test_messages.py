@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 import trimesh
 from command_line import refused, run
+from conftest import box_mesh
 
 import palpate
+from palpate.mesh.surface_file import load_surface
 
 GMSH_1 = """$NOD
 4
@@ -37,8 +39,9 @@ def test_stl_text_with_a_footer_of_two_words_is_read(footer, tmp_path):
     lines = text.strip().splitlines()
     head = lines[0].split()[0] + " part"
     (tmp_path / "part.stl").write_text("\n".join([head, *lines[1:-1], footer]))
-    mesh = palpate.tetrahedralize(tmp_path / "part.stl", 0.02)
-    assert mesh.volume == pytest.approx(0.05 * 0.04 * 0.03)
+    shape = load_surface(tmp_path / "part.stl").shape
+    shape.merge_vertices()
+    assert shape.is_watertight and shape.volume == pytest.approx(0.05 * 0.04 * 0.03)
 
 
 @pytest.mark.parametrize("ending", [".stl", ".msh", ".toml", ".palpate"])
@@ -100,8 +103,9 @@ def test_values_of_a_wrong_kind_are_explained_in_words(table, message, tmp_path)
     assert "\n" not in str(raised.value)
 
 
-def test_a_scene_made_by_a_program_is_refused_by_the_same_words():
+def test_a_scene_made_by_a_program_is_refused_by_the_same_words(tmp_path):
+    box_mesh().write(tmp_path / "box.vtu", unit="mm")
     with pytest.raises(palpate.SceneError, match=r"unknown key 'body\.modl'; did you mean 'model'"):
         palpate.Scene(body={"modl": "beam"})
     with pytest.raises(palpate.SceneError, match=r"supports\.fixed is missing"):
-        palpate.Scene(body={"mesh": "examples/block.obj", "unit": "mm", "max_element_size": "4cm"}).build()
+        palpate.Scene(body={"mesh": str(tmp_path / "box.vtu"), "unit": "mm"}).build()

@@ -44,6 +44,22 @@ def recorded(cache, tmp_path_factory) -> Path:
     return folder / "press.mcap"
 
 
+@pytest.fixture(scope="module")
+def block(cache, tmp_path_factory) -> Path:
+    """The same scene with the tetrahedra themselves, which no mesher has to find again."""
+    folder = tmp_path_factory.mktemp("block")
+    text = (ROOT / "examples" / "block.toml").read_text()
+    surface = 'mesh = "block.obj"\nunit = "mm"\nmax_element_size = "16mm"\n'
+    assert surface in text
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(cache))
+        built = palpate.Scene.read(ROOT / "examples" / "block.toml").build(progress=False)
+    built.bodies[0].body.mesh.write(folder / "block.vtu", unit="m")
+    mesh_file = (folder / "block.vtu").as_posix()
+    (folder / "block.toml").write_text(text.replace(surface, f'mesh = "{mesh_file}"\nunit = "m"\n'))
+    return folder / "block.toml"
+
+
 def test_a_press_is_recorded_and_made_again(recorded, shared_cache, tmp_path):
     again = run("replay", recorded, "--headless", cwd=tmp_path)
     assert again.returncode == 0 and again.stdout.strip().endswith("ticks computed again: every bit is as recorded")
@@ -51,8 +67,8 @@ def test_a_press_is_recorded_and_made_again(recorded, shared_cache, tmp_path):
     assert force.max() > 0.01
 
 
-def test_another_scene_gives_other_bits(recorded, shared_cache, tmp_path):
-    text = (ROOT / "examples" / "block.toml").read_text().replace('"block.obj"', f'"{ROOT}/examples/block.obj"')
+def test_another_scene_gives_other_bits(recorded, block, shared_cache, tmp_path):
+    text = block.read_text()
     (tmp_path / "slippery.toml").write_text(text.replace('radius = "6mm"', 'radius = "6.0001mm"'))
     (tmp_path / "other.toml").write_text(text.replace('"10kPa"', '"11kPa"'))
     other = run("replay", recorded, "--headless", "--scene", "slippery.toml", cwd=tmp_path)
@@ -64,8 +80,7 @@ def test_another_scene_gives_other_bits(recorded, shared_cache, tmp_path):
     )
 
 
-def test_files_that_cannot_be(recorded, tmp_path):
-    block = ROOT / "examples" / "block.toml"
+def test_files_that_cannot_be(recorded, block, shared_cache, tmp_path):
     before = recorded.read_bytes()
     refused(run("run", block, "--headless", 0.5, "--record", recorded, cwd=tmp_path), "press.mcap: exists")
     refused(run("run", block, "--headless", 0.5, "--record", "no/a.mcap", cwd=tmp_path), "there is no folder no")
@@ -74,10 +89,10 @@ def test_files_that_cannot_be(recorded, tmp_path):
     assert recorded.read_bytes() == before
 
 
-def test_a_killed_process_loses_a_tenth_of_a_second(tmp_path, shared_cache):
+def test_a_killed_process_loses_a_tenth_of_a_second(block, tmp_path, shared_cache):
     code = (
         "import sys, time, palpate\n"
-        f"simulation = palpate.Simulation(palpate.Scene.read({str(ROOT / 'examples' / 'block.toml')!r}))\n"
+        f"simulation = palpate.Simulation(palpate.Scene.read({str(block)!r}))\n"
         "simulation.record('killed.mcap')\n"
         "with simulation:\n"
         "    while True:\n"
@@ -100,11 +115,11 @@ def test_a_killed_process_loses_a_tenth_of_a_second(tmp_path, shared_cache):
 
 
 @pytest.mark.slow
-def test_a_full_disk_ends_the_recording_and_nothing_else(tmp_path, shared_cache):
+def test_a_full_disk_ends_the_recording_and_nothing_else(block, tmp_path, shared_cache):
     """The size of files is limited in the process, as a full disk would."""
     code = (
         "import resource, signal, sys, time, palpate\n"
-        f"simulation = palpate.Simulation(palpate.Scene.read({str(ROOT / 'examples' / 'block.toml')!r}))\n"
+        f"simulation = palpate.Simulation(palpate.Scene.read({str(block)!r}))\n"
         "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (30_000, 30_000))\n"
         "simulation.record('full.mcap')\n"

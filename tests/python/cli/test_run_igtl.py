@@ -25,9 +25,9 @@ def free_port() -> int:
 
 
 @contextlib.contextmanager
-def running(*options, cwd):
+def running(*options, cwd, scene=BLOCK):
     program = "from palpate.cli import main; main()"
-    command = [sys.executable, "-c", program, "run", str(BLOCK), "--no-browser", *options]
+    command = [sys.executable, "-c", program, "run", str(scene), "--no-browser", *options]
     with (Path(cwd) / "output").open("wb") as output:
         process = subprocess.Popen(command, cwd=cwd, stdout=output, stderr=subprocess.STDOUT)
     try:
@@ -70,7 +70,8 @@ def test_a_client_of_the_command_feels_the_block(tmp_path, shared_cache):
 
 def test_without_the_option_no_port_is_open(tmp_path, shared_cache):
     port, page = free_port(), free_port()
-    with running("--port", str(page), cwd=tmp_path) as process:
+    (tmp_path / "beam.toml").write_text('[body]\nmodel = "beam"\npaper = true\n')
+    with running("--port", str(page), cwd=tmp_path, scene=tmp_path / "beam.toml") as process:
         wait_for_port(page, process, tmp_path)
         with pytest.raises(OSError), socket.create_connection(("127.0.0.1", port), 1):
             pass

@@ -11,6 +11,11 @@ from palpate import environments
 from palpate.environments import FindNodule, ScriptedSearcher
 
 
+@pytest.fixture(autouse=True)
+def one_cache(shared_cache):
+    """The slabs are solved once for all tests."""
+
+
 def test_it_passes_the_check_of_gymnasium():
     env = gymnasium.make("palpate/FindNodule-v0", slabs=1)
     assert isinstance(env.unwrapped, FindNodule)

@@ -23,6 +23,8 @@ from palpate.body import description, problem_arrays
 from palpate.green.bounds import CHOSEN
 
 ERRORS = {"f64": 1e-11, "f32": 1e-6, "f16": 1e-3}
+# Of the body whose computation is interrupted.
+CELLS = (14, 10, 10)
 
 
 def dense_psi(body: palpate.Body) -> tuple[np.ndarray, np.ndarray]:
@@ -150,7 +152,7 @@ def test_number_of_threads_changes_no_bit(tmp_path):
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory):
     path = tmp_path_factory.mktemp("undisturbed") / "a.palpate"
-    program = child_program((20, 15, 15), f"palpate.precompute(body, path={str(path)!r})")
+    program = child_program(CELLS, f"palpate.precompute(body, path={str(path)!r})")
     subprocess.run([sys.executable, "-c", program], check=True, timeout=280)
     return path.read_bytes()
 
@@ -180,7 +182,7 @@ def test_interrupted_precompute_resumes_to_the_same_bits(kill, undisturbed, tmp_
     path = tmp_path / "a.palpate"
     at = random.Random(int(kill)).uniform(0.05, 0.8)
     program = child_program(
-        (20, 15, 15),
+        CELLS,
         f"""
 # What starts tests in the background ignores SIGINT, and what is ignored is inherited.
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -203,9 +205,7 @@ palpate.precompute(body, path={str(path)!r}, progress=show)
     child.communicate(timeout=280)
     assert child.returncode != 0
     left = os.listdir(tmp_path)
-    body = palpate.Body(
-        box_mesh(cells=(20, 15, 15)), material=palpate.Material(1e4, 0.4), fixed=lambda p: p[:, 0] < 1e-9
-    )
+    body = palpate.Body(box_mesh(cells=CELLS), material=palpate.Material(1e4, 0.4), fixed=lambda p: p[:, 0] < 1e-9)
     if not path.exists():
         assert "a.palpate.partial" in left
         problem, about = problem_arrays(body, None), json.dumps(description(body))
@@ -222,7 +222,7 @@ def test_a_full_disk_leaves_what_is_finished(room, undisturbed, tmp_path):
     """A limit of the size of a file is met as the end of a disk is."""
     path = tmp_path / "a.palpate"
     program = child_program(
-        (20, 15, 15),
+        CELLS,
         f"""
 import resource
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
@@ -240,9 +240,7 @@ except palpate.StoreError as error:
         in result.stdout
     )
     assert os.listdir(tmp_path) == ["a.palpate.partial"]
-    body = palpate.Body(
-        box_mesh(cells=(20, 15, 15)), material=palpate.Material(1e4, 0.4), fixed=lambda p: p[:, 0] < 1e-9
-    )
+    body = palpate.Body(box_mesh(cells=CELLS), material=palpate.Material(1e4, 0.4), fixed=lambda p: p[:, 0] < 1e-9)
     seen = []
     palpate.precompute(body, path=path, progress=lambda done, total: seen.append(done / total))
     assert min(part for part in seen if part > 0) > (0.1 if room < 0.5 else 0.999)
@@ -261,9 +259,7 @@ def test_partial_of_another_body_is_thrown_away(block, tmp_path):
 
 
 def test_damaged_block_of_a_partial_is_computed_again(undisturbed, tmp_path):
-    body = palpate.Body(
-        box_mesh(cells=(20, 15, 15)), material=palpate.Material(1e4, 0.4), fixed=lambda p: p[:, 0] < 1e-9
-    )
+    body = palpate.Body(box_mesh(cells=CELLS), material=palpate.Material(1e4, 0.4), fixed=lambda p: p[:, 0] < 1e-9)
     path, partial = tmp_path / "a.palpate", tmp_path / "a.palpate.partial"
 
     def stop(done, total):
@@ -272,10 +268,9 @@ def test_damaged_block_of_a_partial_is_computed_again(undisturbed, tmp_path):
 
     with pytest.raises(KeyboardInterrupt):
         palpate.precompute(body, path=path, progress=stop)
-    if partial.exists():
-        content = bytearray(partial.read_bytes())
-        for at in range(5000, len(content), 100_000):
-            content[at] ^= 1
-        partial.write_bytes(content)
-        palpate.precompute(body, path=path)
+    content = bytearray(partial.read_bytes())
+    for at in range(5000, len(content), 100_000):
+        content[at] ^= 1
+    partial.write_bytes(content)
+    palpate.precompute(body, path=path)
     assert path.read_bytes() == undisturbed

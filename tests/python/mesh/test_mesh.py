@@ -15,6 +15,7 @@ from conftest import box_mesh
 import palpate
 from palpate.mesh import tetrahedralize as module_function
 from palpate.mesh.files import WRITERS
+from palpate.mesh.surface_file import load_surface
 
 tetrahedralize = module_function
 
@@ -94,11 +95,21 @@ def test_netgen_reads_our_vol_file(tmp_path):
 
 
 @pytest.mark.parametrize("ending", ["stl", "obj", "ply", "off", "glb"])
-def test_surfaces_are_filled(tmp_path, ending):
+def test_surfaces_are_read_whole(tmp_path, ending):
+    """Whichever file they are from, all that fills them gets the same triangles."""
     ball = trimesh.creation.icosphere(subdivisions=3, radius=0.04)
     ball.export(tmp_path / f"ball.{ending}")
+    shape = load_surface(tmp_path / f"ball.{ending}").shape
+    shape.merge_vertices()
+    assert shape.is_watertight and len(shape.faces) == len(ball.faces)
+    assert shape.triangles_center == pytest.approx(ball.triangles_center, abs=1e-8)
+
+
+def test_a_surface_of_a_file_is_filled(tmp_path):
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.04)
+    ball.export(tmp_path / "ball.stl")
     with pytest.warns(palpate.MeshWarning, match="the mesh loses"):
-        mesh = tetrahedralize(tmp_path / f"ball.{ending}", max_element_size=0.012)
+        mesh = tetrahedralize(tmp_path / "ball.stl", max_element_size=0.012)
     assert mesh.volume == pytest.approx(ball.volume, rel=0.06)
     assert np.linalg.norm(mesh.nodes[mesh.surface_nodes], axis=1) == pytest.approx(0.04, rel=0.03)
     assert mesh.dihedral_angles().min() > 5
@@ -154,26 +165,29 @@ def test_unreadable_volumes_are_named(tmp_path, name, content, message):
         palpate.TetMesh.read(tmp_path / name)
 
 
-@pytest.mark.parametrize("ending", sorted(WRITERS))
-def test_a_full_disk_names_the_file_and_leaves_nothing(tmp_path, ending):
+def test_a_full_disk_names_the_file_and_leaves_nothing(tmp_path):
     """Files of this child may not grow beyond 1 kB: writing fails midway, as on a full disk."""
     box_mesh().write(tmp_path / "box.vtu")
-    code = f"""
-        import resource, signal
+    code = """
+        import os, resource, signal, sys
         import palpate
         mesh = palpate.TetMesh.read("box.vtu")
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
-        try:
-            mesh.write("out{ending}")
-        except OSError as error:
-            print(error.filename)
+        for ending in sys.argv[1:]:
+            try:
+                mesh.write(f"out{ending}")
+            except OSError as error:
+                print(ending, error.filename, *os.listdir())
     """
-    result = subprocess.run(
-        [sys.executable, "-c", textwrap.dedent(code)], cwd=tmp_path, capture_output=True, text=True, check=True
-    )
-    assert result.stdout.strip().startswith("out.")
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["box.vtu"]
+    endings = sorted(WRITERS)
+    command = [sys.executable, "-c", textwrap.dedent(code), *endings]
+    result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    lines = [line.split() for line in result.stdout.splitlines()]
+    assert [ending for ending, *_ in lines] == endings
+    for ending, file, *left in lines:
+        assert file.startswith("out."), ending
+        assert left == ["box.vtu"], ending
 
 
 def test_regions_by_shape_follow_the_centroids():

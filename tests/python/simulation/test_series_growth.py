@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import shutil
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,16 +25,48 @@ ABOVE, PRESSED = (0.08, 0.01, 0.032), (0.08, 0.01, 0.012)
 TICKS, SETTLES = 600, 1.0
 
 
-@pytest.fixture
-def beam(tmp_path):
-    """A clamped beam, whose series is not known yet: it is softer by 15 % with it."""
+@pytest.fixture(scope="module")
+def body() -> palpate.Body:
     mesh = box((20, 4, 4), (0.1, 0.02, 0.02), quadratic=True)
     material = palpate.Material(10e3, 0.45, law="neo-hookean")
-    body = palpate.Body(mesh, material=material, fixed=lambda places: places[:, 0] < 1e-9)
-    green = palpate.precompute(body, path=tmp_path / "beam.palpate", progress=False)
+    return palpate.Body(mesh, material=material, fixed=lambda places: places[:, 0] < 1e-9)
+
+
+@pytest.fixture(scope="module")
+def store(body, tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("store") / "beam.palpate"
+    return palpate.precompute(body, path=path, progress=False).path
+
+
+def beam_of(body: palpate.Body, store: Path) -> BuiltScene:
+    """A clamped beam: it is softer by 15 % with its series, which lies beside the store."""
     table = {"name": "body", "model": "beam"}  # the table asks for a source; the body is given
     scene = Scene(body=table, tool=[sphere(RADIUS, 0.0)], device=UNLIMITED, view={"strain_limit": 0.0})
-    return with_stored_series(BuiltScene.of(scene, body, green))
+    return with_stored_series(BuiltScene.of(scene, body, palpate.GreensFunction.load(store, body=body)))
+
+
+@pytest.fixture(scope="module")
+def with_the_series(body, store, tmp_path_factory) -> Path:
+    """Folder with the store and its series."""
+    folder = tmp_path_factory.mktemp("with_the_series")
+    with_series(beam_of(body, Path(shutil.copy(store, folder))))
+    return folder
+
+
+@pytest.fixture
+def beam(body, store, tmp_path) -> BuiltScene:
+    """The beam whose series is not known yet."""
+    beam = beam_of(body, Path(shutil.copy(store, tmp_path)))
+    assert beam.bodies[0].series == ((RADIUS, None),)
+    return beam
+
+
+@pytest.fixture
+def known_beam(body, store, with_the_series, tmp_path) -> BuiltScene:
+    shutil.copytree(with_the_series, tmp_path, dirs_exist_ok=True)
+    beam = beam_of(body, tmp_path / store.name)
+    assert beam.bodies[0].series[0][1].is_complete
+    return beam
 
 
 def path_of_press() -> np.ndarray:
@@ -70,7 +104,6 @@ def settled_force(simulation: Simulation, place: tuple[float, float, float]) -> 
 
 
 def test_a_script_waits_for_the_series(beam):
-    assert beam.bodies[0].series == ((RADIUS, None),)
     forces = pressed(beam)
     assert np.array_equal(forces, pressed(with_series(beam)))
     assert forces[-1, 2] < 0.93 * pressed(without_series(beam))[-1, 2]
@@ -99,9 +132,9 @@ def test_a_running_loop_takes_the_series_up_when_the_tool_has_lifted(beam):
         assert simulation.series is None
 
 
-def test_a_tool_of_another_radius_gets_its_series_in_the_running_loop(beam):
+def test_a_tool_of_another_radius_gets_its_series_in_the_running_loop(known_beam):
     smaller = 0.006
-    with Simulation(with_series(beam)) as simulation:
+    with Simulation(known_beam) as simulation:
         assert simulation.series is None
         simulation.add_tool(radius=f"{smaller} m", contact="local", friction=0.0)
         assert [radius for radius, _ in simulation.bodies[0].series] == [RADIUS, smaller]
@@ -112,7 +145,7 @@ def test_a_tool_of_another_radius_gets_its_series_in_the_running_loop(beam):
         tables = simulation.scene
     # It is that of a scene with both tools, and another one than without.
     path = np.stack([np.full_like(path_of_press(), 1.0), path_of_press() - (0.0, 0.0, RADIUS - smaller)], axis=1)
-    changed, bodies = Simulation(beam), with_series(BuiltScene(tables, beam.bodies))
+    changed, bodies = Simulation(known_beam), with_series(BuiltScene(tables, known_beam.bodies))
     changed.add_tool(radius=f"{smaller} m", contact="local", friction=0.0)
     forces = changed.run(path)[:, 1]
     assert np.array_equal(forces, Simulation(bodies).run(path)[:, 1])
@@ -140,15 +173,15 @@ def test_a_recording_has_the_series_that_its_loop_had(beam, tmp_path):
         built_scene_of(recording, without_series(beam))
 
 
-def test_a_closed_path_into_the_unknown_part_gives_out_nothing(beam):
+def test_a_closed_path_into_the_unknown_part_gives_out_nothing(known_beam):
     """Where the series is known in part the force is the gradient of one energy too."""
-    (known,) = [series for _, series in with_series(beam).bodies[0].series]
+    (known,) = [series for _, series in known_beam.bodies[0].series]
     half = known.only([block < len(known.known) // 2 for block in range(len(known.known))])
     corners = np.array([[0.07, 0.01, 0.0305], [0.07, 0.01, 0.02], [0.025, 0.012, 0.026], [0.025, 0.012, 0.0305]])
     shares = np.linspace(0.0, 1.0, 1500, endpoint=False)[:, None]
     path = np.vstack([a + shares * (b - a) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)])
     whole, none, partial = (
-        run_as_known(replace(beam, bodies=(replace(beam.bodies[0], series=((RADIUS, series),)),)), path)
+        run_as_known(replace(known_beam, bodies=(replace(known_beam.bodies[0], series=((RADIUS, series),)),)), path)
         for series in (known, None, half)
     )
     # It goes from one part into the other.

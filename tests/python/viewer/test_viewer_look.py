@@ -110,7 +110,13 @@ def test_a_screenshot_has_all_pixels_of_a_large_window(chromium, program, tmp_pa
         assert page.evaluate("document.getElementById('canvas').width") == drawn_pixels
 
 
-def test_the_scale_bar_is_true_and_follows_the_zoom(page):
+def test_the_scale_bar_is_true_and_follows_the_zoom(chromium, program):
+    """The bar is measured in pixels of the layout: few of the screen are enough."""
+    with opened(chromium, program) as page:
+        the_scale_bar_is_true_and_follows_the_zoom(page)
+
+
+def the_scale_bar_is_true_and_follows_the_zoom(page):
     def told():
         bar = page.get_by_test_id("scale")
         metres, length = (float(bar.get_attribute(f"data-{name}")) for name in ("metres", "pixels"))

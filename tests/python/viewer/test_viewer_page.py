@@ -37,7 +37,7 @@ def test_a_press_is_felt_shown_and_released(page, capsys):
     before, started = state(page), time.monotonic()
     x, y = page.evaluate("window.palpate.pickPoint()")
     pressed = press(page)
-    drag(page, (x, y), (x - 10, y), 60)
+    drag(page, (x, y), (x - 10, y), 15)
     moved, took = state(page), time.monotonic() - started
     # Pressed from above: the device is pushed up, the body's force on it has the sign of the outward normal.
     assert pressed["force"][2] > 0
@@ -95,7 +95,7 @@ def test_a_drag_slides_along_the_surface(page):
     x, y = x - 20, y + 70
     press(page, place=(x, y))
     before = np.array(state(page)["tools"][0]["position"])
-    drag(page, (x, y), (x + 60, y + 20), 30)
+    drag(page, (x, y), (x + 60, y + 20), 15)
     assert shown(page, "contact-value") > 0
     assert page.get_by_test_id("contact-slides").inner_text() in {"slides", "sticks"}
     settled_force(page)
@@ -110,9 +110,9 @@ def test_a_drag_slides_along_the_surface(page):
     # Rolls off beside the body, and comes back.
     outside = page.locator("#canvas").bounding_box()
     edge = (outside["x"] + 0.5 * outside["width"], outside["y"] + 15)
-    drag(page, (x + 60, y + 20), edge, 40)
+    drag(page, (x + 60, y + 20), edge, 15)
     until(page, lambda s: s["contacts"] == 0)
-    drag(page, edge, (x, y), 40)
+    drag(page, edge, (x, y), 15)
     until(page, lambda s: s["contacts"] == 1)
     page.mouse.up()
 
@@ -322,7 +322,7 @@ def test_long_work_has_a_cancel_button(chromium, tmp_path):
 
 @pytest.mark.slow
 def test_leaving_the_page_lets_go(chromium, program, page):
-    watcher = chromium.new_context().new_page()
+    watcher = chromium.new_context(device_scale_factor=0.25).new_page()
     watcher.goto(program.address)
     until(watcher, lambda s: s["frames"] > 3 and s["role"] == "watch")
     assert watcher.locator("#watching").is_visible()
@@ -336,7 +336,7 @@ def test_leaving_the_page_lets_go(chromium, program, page):
 @pytest.mark.slow
 @pytest.mark.parametrize("size", [(1280, 720), (390, 844)])
 def test_nothing_is_cut_off(chromium, program, size):
-    context = chromium.new_context(viewport={"width": size[0], "height": size[1]})
+    context = chromium.new_context(viewport={"width": size[0], "height": size[1]}, device_scale_factor=0.25)
     context.add_init_script(MORE_OPEN)
     page = context.new_page()
     page.goto(program.address)
@@ -352,7 +352,7 @@ def test_nothing_is_cut_off(chromium, program, size):
 
 
 def test_an_address_without_the_token_is_explained(chromium, program):
-    context = chromium.new_context()
+    context = chromium.new_context(device_scale_factor=0.25)
     page = context.new_page()
     page.goto(program.address.partition("#")[0] + "#token=wrong")
     page.get_by_text("no valid token").wait_for()
@@ -393,7 +393,7 @@ def test_a_page_from_another_origin_cannot_connect(chromium, program, tmp_path):
 
 def test_a_program_that_ends_is_noticed(chromium, cache):
     program = Program(cache, "liver", "--paper")
-    context = chromium.new_context()
+    context = chromium.new_context(device_scale_factor=0.25)
     page = context.new_page()
     page.goto(program.address)
     until(page, lambda s: s["frames"] > 3)

@@ -166,28 +166,29 @@ def test_a_plane_and_a_nodule_are_in_the_scene_and_nothing_is_written_over(ball,
     assert sorted(path.name for path in saves.iterdir()) == ["ball-2.toml", "ball-2.vtu", "ball.toml", "ball.vtu"]
 
 
-@pytest.mark.parametrize(
-    ("name", "content", "reason"),
-    [
-        ("wrong.stl", b"no triangles here", "cannot be read as a surface"),
-        ("wrong.xyz", b"1 2 3", "no surface, mesh or segmentation"),
-        ("scene.toml", b"[body]", "palpate run"),
-        ("../../flat.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "encloses"),
-    ],
-)
-def test_a_wrong_file_is_one_line_and_what_was_set_up_stays(ball, saves, name, content, reason):
+WRONG_FILES = [
+    ("wrong.stl", b"no triangles here", "cannot be read as a surface"),
+    ("wrong.xyz", b"1 2 3", "no surface, mesh or segmentation"),
+    ("scene.toml", b"[body]", "palpate run"),
+    ("../../flat.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "encloses"),
+]
+
+
+def test_a_wrong_file_is_one_line_and_what_was_set_up_stays(ball, saves):
     async def session():
         async with empty_page(saves) as (server, client):
             before = await filled(client, ball)
-            await client.say(type="upload", name=name, size=len(content))
-            if reason not in ("no surface, mesh or segmentation", "palpate run"):
-                await client.receive("uploaded")
-                await client.socket.send(content)
-            error, _ = await client.receive("error")
-            assert reason in error["text"] and "\n" not in error["text"] and "/tmp" not in error["text"]
-            while server.is_building:
-                await asyncio.sleep(0.01)
-            assert server._setting_up.message()["body"] == before and server.session.body.read.file == "ball.stl"
+            for name, content, reason in WRONG_FILES:
+                await client.say(type="upload", name=name, size=len(content))
+                if reason not in ("no surface, mesh or segmentation", "palpate run"):
+                    await client.receive("uploaded")
+                    await client.socket.send(content)
+                error, _ = await client.receive("error")
+                assert reason in error["text"] and "\n" not in error["text"] and "/tmp" not in error["text"]
+                while server.is_building:
+                    await asyncio.sleep(0.01)
+                assert server._setting_up.message()["body"] == before, name
+                assert server.session.body.read.file == "ball.stl"
 
     asyncio.run(session())
 
@@ -237,29 +238,29 @@ def test_filling_is_cancelled_at_once_and_a_second_file_takes_the_place_of_the_f
     asyncio.run(session())
 
 
-@pytest.mark.parametrize(
-    "choice",
-    [
-        {"radius": 1.0},
-        {"radius": "6mm"},
-        {"tissue": "granite"},
-        {"plane": {"axis": 3, "above": True, "depth": 0.01}},
-        {"plane": {"axis": 1, "above": True, "depth": 10.0}},
-        {"nodule": {"center": [1, 0, 0], "radius": 0.01, "youngs_modulus": 1e4}},
-        {"nodule": {"center": [0, 0, 0], "radius": 0.01, "youngs_modulus": -1}},
-        {"unit": "parsec"},
-        {"name": "other"},
-        {},
-    ],
-)
-def test_choices_that_make_no_sense_are_refused(ball, saves, choice):
+CHOICES_WITHOUT_SENSE = [
+    {"radius": 1.0},
+    {"radius": "6mm"},
+    {"tissue": "granite"},
+    {"plane": {"axis": 3, "above": True, "depth": 0.01}},
+    {"plane": {"axis": 1, "above": True, "depth": 10.0}},
+    {"nodule": {"center": [1, 0, 0], "radius": 0.01, "youngs_modulus": 1e4}},
+    {"nodule": {"center": [0, 0, 0], "radius": 0.01, "youngs_modulus": -1}},
+    {"unit": "parsec"},
+    {"name": "other"},
+    {},
+]
+
+
+def test_choices_that_make_no_sense_are_refused(ball, saves):
     async def session():
         async with empty_page(saves) as (server, client):
             await filled(client, ball)
             before = server._setting_up._body.choices
-            await client.say(type="setup", **choice)
-            assert "setup" in (await client.receive("error"))[0]["text"]
-            assert server._setting_up._body.choices == before
+            for choice in CHOICES_WITHOUT_SENSE:
+                await client.say(type="setup", **choice)
+                assert "setup" in (await client.receive("error"))[0]["text"], choice
+                assert server._setting_up._body.choices == before, choice
 
     asyncio.run(session())
 
