@@ -30,7 +30,8 @@ class Page:
 
     def __init__(self, server: ViewerServer, socket):
         self.server, self.socket = server, socket
-        self.texts: list[dict] = []
+        # The last message about what is computed beside the loop; it may come before the scene of which it is.
+        self.computed: dict = {"bodies": []}
 
     async def say(self, **message):
         await self.socket.send(json.dumps(message))
@@ -47,6 +48,8 @@ class Page:
                         await self.say(type="ack", frame=header["frame"])
                 else:
                     header, arrays = json.loads(raw), {}
+                    if header["type"] == "computed":
+                        self.computed = header
                 if header["type"] == kind:
                     return header, arrays
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from pathlib import Path
 
@@ -59,8 +60,9 @@ def test_the_size_of_a_scene_is_printed_before_it_is_computed(capsys, monkeypatc
             built_from(tmp_path / "a.toml", RunOptions(), growing)
     mesh = palpate.TetMesh.read(tmp_path / "box.vtu", "m")
     counts = f"({len(mesh.nodes)} nodes, {len(mesh.surface_nodes)} on the surface)"
-    line = capsys.readouterr().out.strip()
+    line, series = capsys.readouterr().out.strip().splitlines()
     assert line.startswith(f"computing {3 * len(mesh.surface_nodes)} columns: at most ") and line.endswith(counts)
+    assert re.fullmatch(r"series beyond small strain below spheres of 5 mm: \d+ places, .* MB, time about .*", series)
     # The second time its store is there.
     for printed in (True, False):
         built_from(tmp_path / "a.toml", RunOptions(), growing)

@@ -290,14 +290,11 @@ def test_a_body_that_takes_long_is_touched_before_all_of_it_is_computed(ball, sa
             await client.say(type="touch")
             # The ball around the top that comes first has its first columns as the loop begins.
             await scene_where(client, lambda scene: len(scene["tools"]) == 1)
-            columns = 0
-            while True:
-                (body,) = (await client.receive("computed"))[0]["bodies"] or [{"columns": 0, "done": 1}]
-                columns = max(columns, body["columns"])
-                if body["columns"] and body["done"] == body["columns"]:
-                    break
             surface = len(server._setting_up._body.mesh.surface_nodes)
-            assert columns == 3 * surface and server.session.built.scene.touch.first is not None
+            while [body["done"] for body in client.computed["bodies"]] != [3 * surface]:
+                await client.receive("frame")
+            assert client.computed["bodies"][0]["columns"] == 3 * surface
+            assert server.session.built.scene.touch.first is not None
             await client.say(type="save")
             await setup_where(client, lambda m: m["body"]["saved"])
 
