@@ -50,6 +50,9 @@ def slide(page, name: str, value: float) -> None:
 
 @pytest.mark.slow
 def test_a_number_is_typed_and_a_double_click_brings_the_default(page):
+    # With friction the force depends on how the tool came to its place, which a busy machine changes by 2 %.
+    fill(page, "friction", "0")
+    shows(page, "friction", "0.00")
     press(page)
     soft = np.linalg.norm(settled_force(page))
     page.mouse.up()
