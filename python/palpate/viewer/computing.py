@@ -134,8 +134,8 @@ def mask_of(message: Mapping[str, Any], key: str) -> np.ndarray:
 
 
 def _is_same(message: Mapping[str, Any], last: Mapping[str, Any]) -> bool:
-    """Whether nothing differs but a little time."""
-    if message["series"] != last["series"]:
+    """Whether nothing differs but a little time; another scene may have another number of bodies."""
+    if message["series"] != last["series"] or len(message["bodies"]) != len(last["bodies"]):
         return False
     for now, before in zip(message["bodies"], last["bodies"], strict=True):
         left, last_left = now["left_s"], before["left_s"]

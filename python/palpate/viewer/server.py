@@ -173,14 +173,16 @@ class ViewerServer:
         # Modules are not garbage: a full collection that looks through them all halts everything for 30 ms.
         gc.collect()
         gc.freeze()
-        self._watch = asyncio.create_task(self._watchdog())
+        # Two tasks: what fails in a message must not end the one that lets go of the body.
+        self._watches = [asyncio.create_task(self._watchdog()), asyncio.create_task(self._watch_computed())]
 
     async def stop(self) -> dict[str, Any] | None:
         """Close all connections and stop the loop: the report on the recording that this ends, if it ends one."""
         if self._server is not None:
             gc.unfreeze()
             sys.setswitchinterval(self._interval)
-            self._watch.cancel()
+            for watch in self._watches:
+                watch.cancel()
             self._server.close()
             await self._server.wait_closed()
         if self._building is not None:
@@ -350,6 +352,10 @@ class ViewerServer:
             if controller is None or time.monotonic() - controller.last_message > LOST_AFTER:
                 await self._worker.call(self._session.release)
             await self._send_recording_end(await self._worker.call(self._session.recorder.stop_after_failure))
+
+    async def _watch_computed(self) -> None:
+        while True:
+            await asyncio.sleep(0.25)
             await self._send_computed()
 
     async def _send_computed(self) -> None:

@@ -24,7 +24,7 @@ from palpate.green.bounds import CHOSEN
 
 ERRORS = {"f64": 1e-11, "f32": 1e-6, "f16": 1e-3}
 # Of the body whose computation is interrupted.
-CELLS = (14, 10, 10)
+CELLS = (20, 14, 14)
 
 
 def dense_psi(body: palpate.Body) -> tuple[np.ndarray, np.ndarray]:

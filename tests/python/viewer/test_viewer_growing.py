@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import base64
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from viewer_client import page, serving
 
 import palpate
 from palpate.mesh import TetMesh
+from palpate.viewer.computing import Computing
 
 SIDE = 0.06
 
@@ -34,6 +36,19 @@ device = { priority = 0 }
 
 def nodes_of(mask: str) -> np.ndarray:
     return np.flatnonzero(np.unpackbits(np.frombuffer(base64.b64decode(mask), np.uint8), bitorder="little"))
+
+
+def test_a_scene_of_another_number_of_bodies_is_another_message(block_green):
+    """It may come before what is computed of it is followed."""
+
+    def shown(*greens) -> SimpleNamespace:
+        return SimpleNamespace(built=SimpleNamespace(bodies=[SimpleNamespace(green=green) for green in greens]))
+
+    computing = Computing()
+    assert computing.step(shown())["bodies"] == []
+    (entry,) = computing.step(shown(block_green))["bodies"]
+    assert entry["done"] == entry["columns"] == 3 * len(block_green.touchable_nodes)
+    assert computing.step(shown(block_green)) is None
 
 
 @pytest.mark.slow
