@@ -29,8 +29,8 @@ from palpate.validation.verify.contact.loop import UNLIMITED, sphere
 
 # Distance between ticks of a press, m, and the height from which it starts.
 TICK, START = 2e-5, 5e-4
-# Radius around the place that may be touched, over the sphere's.
-TOUCHED = 3.6
+# Radius around the place that may be touched, and how far below it, over the sphere's radius.
+TOUCHED, DEEP = 3.6, 2.5
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def pressed(case: Pressed, law: str, series: bool, folder: Path) -> tuple[np.nda
     body = case.body(law)
     surface = body.mesh.surface_nodes
     offset = body.mesh.nodes[surface] - case.place
-    near = (np.linalg.norm(offset, axis=1) < TOUCHED * RADIUS) & (offset @ case.normal > -RADIUS)
+    near = (np.linalg.norm(offset, axis=1) < TOUCHED * RADIUS) & (offset @ case.normal > -DEEP * RADIUS)
     green = palpate.precompute(body, touch=surface[near], path=folder / f"{law}.palpate", progress=False)
     table = {"name": "body", "model": "liver"}  # the table asks for a source; the body is given
     scene = Scene(body=table, tool=[sphere(RADIUS, 0.0)], device=UNLIMITED, view={"strain_limit": 0.0})

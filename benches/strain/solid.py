@@ -34,7 +34,8 @@ FACE_POINTS = 6
 
 _A, _B = 0.5854101966249685, 0.1381966011250105
 _POINTS = np.array([[_B, _B, _B], [_A, _B, _B], [_B, _A, _B], [_B, _B, _A]])
-_EDGES = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
+# Corners of the edges whose middles are the nodes 4 to 9.
+EDGES = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
 
 
 class Solid:
@@ -235,7 +236,7 @@ def _gradients(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         corner = np.array([1.0 - xi.sum(), *xi])
         by_xi = np.array([[-1.0, -1.0, -1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
         slopes[q, :4] = (4.0 * corner - 1.0)[:, None] * by_xi
-        for k, (a, b) in enumerate(_EDGES):
+        for k, (a, b) in enumerate(EDGES):
             slopes[q, 4 + k] = 4.0 * (corner[a] * by_xi[b] + corner[b] * by_xi[a])
     jacobian = np.einsum("eai,qaj->eqij", at, slopes)
     return np.einsum("qaj,eqji->eqai", slopes, np.linalg.inv(jacobian)), np.linalg.det(jacobian) / 24.0

@@ -1,0 +1,52 @@
+"""Curved 10-node meshes with smaller elements around a place, and the same surface to the last bit of its shape."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+import palpate
+from benches.strain.solid import EDGES
+
+# Elements in which a point is looked for, by the distance of their middles.
+CANDIDATES = 60
+
+
+def refined(mesh: palpate.TetMesh, place: np.ndarray, reaches: Sequence[float]) -> palpate.TetMesh:
+    """Halve the edges of elements whose middles lie within each of some distances of a place, m, one after the other.
+
+    scikit-fem divides the elements with straight edges. Each new node has then its place in an element of the mesh as
+    given, whose shape functions carry it onto the curved one: quadratic in the parent is quadratic in its parts.
+    """
+    import skfem
+
+    # It says that it copies its arrays.
+    logging.getLogger("skfem").setLevel(logging.ERROR)
+    corners, ranks = np.unique(mesh.tets[:, :4], return_inverse=True)
+    divided = skfem.MeshTet(mesh.nodes[corners].T.copy(), ranks.reshape(-1, 4).T.copy())
+    for reach in reaches:
+        middles = divided.p[:, divided.t].mean(axis=1).T
+        divided = divided.refined(np.flatnonzero(np.linalg.norm(middles - place, axis=1) < reach))
+    points, tets = divided.p.T, divided.t.T
+    edges, numbers = np.unique(np.sort(tets[:, EDGES].reshape(-1, 2), axis=1), axis=0, return_inverse=True)
+    straight = np.vstack([points, points[edges].mean(axis=1)])
+    return palpate.TetMesh(_curved(mesh, straight), np.hstack([tets, len(points) + numbers.reshape(-1, len(EDGES))]))
+
+
+def _curved(mesh: palpate.TetMesh, points: np.ndarray) -> np.ndarray:
+    """Return where points (n, 3) of the elements with straight edges lie in the curved ones, m."""
+    corners = mesh.nodes[mesh.tets[:, :4]]
+    to_barycentric = np.linalg.inv((corners[:, 1:] - corners[:, :1]).transpose(0, 2, 1))
+    _, candidates = cKDTree(corners.mean(axis=1)).query(points, k=min(CANDIDATES, len(corners)))
+    offsets = points[:, None] - corners[candidates, 0]
+    others = np.einsum("ncij,ncj->nci", to_barycentric[candidates], offsets)
+    barycentric = np.concatenate([1.0 - others.sum(axis=2, keepdims=True), others], axis=2)
+    chosen = barycentric.min(axis=2).argmax(axis=1)
+    rows = np.arange(len(points))
+    at = barycentric[rows, chosen]
+    assert at.min() > -1e-9, "a point outside of the elements that are near it"
+    shapes = np.hstack([at * (2.0 * at - 1.0), *(4.0 * at[:, [a]] * at[:, [b]] for a, b in EDGES)])
+    return np.einsum("na,nai->ni", shapes, mesh.nodes[mesh.tets[candidates[rows, chosen]]])
