@@ -16,9 +16,10 @@ from palpate.validation.verify.contact.loop import UNLIMITED, sphere
 # Nodes of the built-in kidney at which the force was lost; R, m.
 NODES, RADIUS = (364, 2024, 2602, 2721), 8e-3
 DEEP, TICK, START = 1.5, 20e-6, 0.5e-3
-# Surface that may be touched, over the radius. Part of the force that may be lost on the way: over an element's edge the
-# compliance has a kink.
-AROUND, LOST = 4.0, 0.01
+# Surface that may be touched, over the radius.
+AROUND = 4.0
+# Part of the force that may be lost on the way: the compliance has a kink over an element's edge.
+LOST = 0.01
 
 
 def normal_at(mesh: palpate.TetMesh, node: int) -> np.ndarray:
