@@ -296,7 +296,7 @@ class ViewerServer:
             await self._worker.call(self._computing.paint, self._session, message)
             await self._send_computed()
         elif message["type"] == "record":
-            await self._send_recording_end(await self._worker.call(self._session.record, message))
+            await self.send_all(await self._worker.call(self._session.record, message))
         else:
             session = self._session
             if await self._worker.call(session.handle, message):
@@ -351,7 +351,7 @@ class ViewerServer:
             controller = self._controller
             if controller is None or time.monotonic() - controller.last_message > LOST_AFTER:
                 await self._worker.call(self._session.release)
-            await self._send_recording_end(await self._worker.call(self._session.recorder.stop_after_failure))
+            await self.send_all(await self._worker.call(self._session.recorder.stop_after_failure))
 
     async def _watch_computed(self) -> None:
         while True:
@@ -364,17 +364,11 @@ class ViewerServer:
             message = await self._worker.call(self._computing.step, self._session)
         except Error as error:
             message = {"type": "error", "text": str(error)}
-        if message is not None:
-            await self.send_all(message)
+        await self.send_all(message)
 
-    async def _send_recording_end(self, ended: dict[str, Any] | None) -> None:
-        """Tell of a recording that has ended."""
-        if ended is not None:
-            await self.send_all(ended)
-
-    async def send_all(self, message: dict[str, Any], but_control: bool = False) -> None:
-        """Send a message to all pages, or to those that watch."""
-        for client in [c for c in self._clients if not (but_control and c is self._controller)]:
+    async def send_all(self, message: dict[str, Any] | None, but_control: bool = False) -> None:
+        """Send a message to all pages, or to those that watch; None is no message."""
+        for client in [c for c in self._clients if message and not (but_control and c is self._controller)]:
             await client.send(message)
 
     async def send_control(self, message: dict[str, Any]) -> None:
@@ -460,7 +454,7 @@ class ViewerServer:
             session = await building.run(make, Session.close)
             # Two loops at real-time priority would keep each other from their deadlines: the old one ends first.
             why = "a recording is of one scene, and this one has another now"
-            await self._send_recording_end(await self._worker.call(self._session.recorder.stop, why))
+            await self.send_all(await self._worker.call(self._session.recorder.stop, why))
             await self._worker.call(exchange, session)
             await self.send_all(await self._worker.call(session.settings))
         except Exception as error:

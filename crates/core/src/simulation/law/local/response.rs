@@ -146,8 +146,8 @@ pub(super) fn evaluate_sphere(
     response.slope = slope(body, guess.force, others, &fields);
     if let Some(near_edge) = &near_edge {
         response.bending = near_edge.bending(&response.indentation, response.foot.normal);
-        response.slope_by_force = compliance_slope(body, guess.force, &fields);
     }
+    response.slope_by_force = compliance_slope(body, guess.force, &fields);
     if let Some(series) = body.series {
         let (blended, known) = blended_series(series, weights);
         (response.series, response.known) = (Some(blended), known);
@@ -158,7 +158,7 @@ pub(super) fn evaluate_sphere(
         let higher = response.higher_orders_at(guess.force);
         response.higher_at_guess = higher;
         response.slope += higher.slope;
-        response.slope_by_force = compliance_slope(body, guess.force, &fields) + higher.slope_by_force;
+        response.slope_by_force += higher.slope_by_force;
     }
     Some(())
 }
@@ -325,6 +325,9 @@ impl LocalResponse {
         let indentation = self.indentation;
         let whole = self.slope + others.slope;
         let slope = whole.clamp_length_max(STEEPEST_INCLINATION * indentation.force);
+        // Higher orders have their own in `turned_push`; a slope at its bound has none.
+        let follows = self.series.is_none() && slope == whole && self.slope_by_force != DMat3::ZERO;
+        let by_guess = if follows { (DMat3::IDENTITY + self.slope_by_force).inverse() } else { DMat3::IDENTITY };
         let part = if self.series.is_some() { self.turned_part } else { 0.0 };
         let mut push = slope - indentation.gradient;
         if part > 0.0 {
@@ -343,6 +346,8 @@ impl LocalResponse {
         let bound = tool.coefficient * pressing;
         self.friction = contact.friction.respond(displacement, bound, tool.coefficient, stiffness, self.normal);
         self.force = self.friction.force - push;
+        // The slope is that at the guess; what the difference changes follows from its derivative.
+        self.force = self.guess.force + by_guess * (self.force - self.guess.force);
         let change = self.force - self.guess.force;
         self.higher = match change.length_squared() < (CLOSE * CLOSE) * self.force.length_squared() {
             true => self.higher_at_guess.moved(change),
@@ -357,9 +362,7 @@ impl LocalResponse {
             self.friction.by_displacement - outer(self.friction.by_pressing, n) * indentation.stiffness;
         self.jacobian = outer(n, n) * indentation.stiffness - turning * indentation.force + self.friction_by_position;
         self.jacobian += self.bending;
-        if self.series.is_none() && self.slope_by_force != DMat3::ZERO {
-            self.jacobian = (DMat3::IDENTITY + self.slope_by_force).inverse() * self.jacobian;
-        }
+        self.jacobian = by_guess * self.jacobian;
         if part > 0.0 {
             (self.offset, self.offset_by_force) = (self.offset * part, self.offset_by_force * part);
             self.jacobian = (DMat3::IDENTITY * (1.0 - part) + self.turning * part) * self.jacobian;

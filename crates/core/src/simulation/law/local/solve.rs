@@ -20,6 +20,7 @@ use super::force_error::{ForceError, estimate};
 use super::half_space::LocalTool;
 use super::inclination::OtherContacts;
 use super::near_corner::{contact_needs_cells, evaluate};
+use super::pace::{MOST_CELL_STEPS, Pace};
 use super::response::{Guess, LocalResponse};
 use super::scratch::{LocalScratch, TrustRegion, local_body};
 use super::snap::{SNAP_STEPS, stable_jacobian};
@@ -41,17 +42,6 @@ use crate::simulation::tool::LawKind;
 use crate::simulation::weight_scratch::WeightScratch;
 use crate::tensor::outer;
 
-/// Most steps; three or four are usual.
-pub const MOST_STEPS: usize = 16;
-/// From this step on steps are shortened, each more than the last: in a concavity about as narrow as the tool the force turns so
-/// fast with the position that whole steps oscillate.
-const USUAL_STEPS: usize = 10;
-/// Longest step, over the tool's radius.
-const LONGEST_STEP: f64 = 0.5;
-/// Length of the last step, over the tool's radius, beyond which the method has diverged.
-const DIVERGED_STEP: f64 = 2e-3;
-/// Most steps with pressure cells; two or three are usual. Each costs a hundred times a closed form.
-pub const MOST_CELL_STEPS: usize = 8;
 /// Residual, over the tool's thickness, beyond which the tool may have left the body: the last evaluation is at the position
 /// without forces.
 const AWAY_RESIDUAL: f64 = 1e-2;
@@ -175,15 +165,14 @@ fn solve_equations(
             FrictionResponse { force: contact.local.friction.force(), ..FrictionResponse::default() };
     }
     let cells = slots.iter().any(|&slot| contact_needs_cells(model, &state.contacts.slots[slot]));
-    let (most, [step_factor, force_factor]) =
-        if cells { (MOST_CELL_STEPS, CELL_TOLERANCES) } else { (MOST_STEPS, [1.0; 2]) };
+    let [step_factor, force_factor] = if cells { CELL_TOLERANCES } else { [1.0; 2] };
     let tool = &model.tools[state.contacts.slots[slots[0]].tool];
     let radius = if cells { tool.shape.thickness() } else { tool.radius };
     let mut trust = TrustRegion::default();
     local.has_best = false;
-    let mut steps = [most, USUAL_STEPS];
+    let mut pace = Pace::new(cells, radius);
     for step in 0..SNAP_STEPS[0] {
-        if cells && step == most {
+        if cells && step == MOST_CELL_STEPS {
             break;
         }
         local.newton_steps = step + 1;
@@ -191,8 +180,10 @@ fn solve_equations(
             return Outcome::ContactEnded;
         }
         if cells {
-            let accepted = local.accept_step(slots.len(), step + 1 == most, &mut trust);
-            if step + 2 == most && trust.least_residual > AWAY_RESIDUAL * radius && all_away(model, state, local, slots)
+            let accepted = local.accept_step(slots.len(), step + 1 == MOST_CELL_STEPS, &mut trust);
+            if step + 2 == MOST_CELL_STEPS
+                && trust.least_residual > AWAY_RESIDUAL * radius
+                && all_away(model, state, local, slots)
             {
                 let from = local.free_positions;
                 local.positions[..slots.len()].copy_from_slice(&from[..slots.len()]);
@@ -202,17 +193,14 @@ fn solve_equations(
                 continue;
             }
         }
-        let (longest, unstable) = newton_step(local, system, slots.len(), cells);
-        if unstable {
-            steps = SNAP_STEPS;
-        }
-        let [most, usual] = steps;
+        let (longest, unstable) = newton_step(local, system, slots.len(), &mut pace);
+        pace.observe(step, &local.steps[..slots.len()], unstable);
         let longest = if cells { local.lengthen_by_power_law(slots.len()) } else { longest };
-        let bound = trust.longest_step.min(LONGEST_STEP * radius);
-        if step >= usual || longest > bound {
-            let share = (bound / longest).min(if step < usual { 1.0 } else { 0.5 });
+        let share = pace.share(step, longest, trust.longest_step);
+        if share < 1.0 {
             local.steps[..slots.len()].iter_mut().for_each(|step| *step *= share);
         }
+        pace.secant.take(&local.steps[..slots.len()], share);
         // The coupling of contacts is known after the first step.
         let is_coupled = step > 0 || slots.len() == 1;
         if is_coupled
@@ -221,9 +209,9 @@ fn solve_equations(
         {
             break;
         }
-        if step + 1 < most {
+        if step + 1 < pace.most_steps() {
             local.take_step(slots.len());
-        } else if !cells && longest > DIVERGED_STEP * radius {
+        } else if pace.has_diverged(longest) {
             return Outcome::Diverged;
         } else {
             break;
@@ -390,11 +378,12 @@ fn evaluate_contacts(
 
 /// One step of Newton's method; returns the longest over the contacts, m, and whether one of them is unstable. Steps with pressure
 /// cells are bounded by their residuals instead.
-fn newton_step(local: &mut LocalScratch, system: &mut System, count: usize, cells: bool) -> (f64, bool) {
+fn newton_step(local: &mut LocalScratch, system: &mut System, count: usize, pace: &mut Pace) -> (f64, bool) {
     let (mut jacobians, mut unstable) = ([DMat3::ZERO; MAX_CONTACTS], false);
+    let mut residuals = [DVec3::ZERO; MAX_CONTACTS];
     for (a, jacobian) in jacobians[..count].iter_mut().enumerate() {
         *jacobian = local.responses[a].jacobian;
-        if !cells {
+        if !pace.cells {
             let is_unstable;
             (*jacobian, is_unstable) = stable_jacobian(*jacobian, &local.between[a][a]);
             unstable |= is_unstable;
@@ -419,6 +408,16 @@ fn newton_step(local: &mut LocalScratch, system: &mut System, count: usize, cell
             }
         }
         system.right[3 * a..3 * a + 3].copy_from_slice(&(-residual).to_array());
+        residuals[a] = residual;
+    }
+    pace.secant.observe(&residuals[..count]);
+    for a in 0..count {
+        let Some(correction) = pace.secant.correction(a) else { break };
+        for row in 0..3 {
+            for column in 0..3 {
+                system.matrix[3 * a + row][3 * a + column] += correction.col(column)[row];
+            }
+        }
     }
     system.solve_unsymmetric(3 * count);
     let mut longest = 0.0f64;

@@ -1,0 +1,77 @@
+//! How many steps Newton's method takes, and how long they are.
+
+use glam::DVec3;
+
+use super::secant::Secant;
+use super::snap::SNAP_STEPS;
+
+/// Most steps; three or four are usual. From the second number on steps are shortened, each more than the last: in a concavity
+/// about as narrow as the tool the force turns so fast with the position that whole steps oscillate.
+pub const USUAL_STEPS: [usize; 2] = [16, 10];
+/// Most steps with pressure cells; two or three are usual. Each costs a hundred times a closed form.
+pub const MOST_CELL_STEPS: usize = 8;
+/// The same numbers with secant corrections. What goes to and fro in spite of them does so over an element's edge, where the slope
+/// jumps and the energy has its minimum: each step is half of the one before, so that they end there.
+const SECANT_STEPS: [usize; 2] = [40, 24];
+/// Longest step, over the tool's radius, and with secant corrections.
+const LONGEST_STEP: f64 = 0.5;
+const LONGEST_SECANT_STEP: f64 = 0.02;
+/// Length of the last whole step, over the tool's radius, beyond which the method has diverged, and on an element's edge.
+const DIVERGED_STEP: f64 = 2e-3;
+const EDGE_STEP: f64 = 2e-2;
+
+/// The pace of one solution.
+pub struct Pace {
+    /// Whether there are pressure cells, whose steps are bounded by their residuals instead.
+    pub cells: bool,
+    /// Radius of the tool, or thickness of one with pressure cells, m.
+    pub radius: f64,
+    pub secant: Secant,
+    snaps: bool,
+}
+
+impl Pace {
+    pub fn new(cells: bool, radius: f64) -> Self {
+        Self { cells, radius, secant: Secant::default(), snaps: false }
+    }
+
+    /// Most steps, and those after which they are shortened.
+    fn steps(&self) -> [usize; 2] {
+        match (self.snaps, self.secant.is_on, self.cells) {
+            (true, _, _) => SNAP_STEPS,
+            (_, true, _) => SECANT_STEPS,
+            (.., true) => [MOST_CELL_STEPS, USUAL_STEPS[1]],
+            _ => USUAL_STEPS,
+        }
+    }
+
+    pub fn most_steps(&self) -> usize {
+        self.steps()[0]
+    }
+
+    /// Takes whole steps, and whether a contact is unstable.
+    pub fn observe(&mut self, step: usize, whole: &[DVec3], unstable: bool) {
+        self.snaps |= unstable;
+        if !self.cells {
+            self.secant.compare(step, whole);
+        }
+    }
+
+    /// Share of whole steps to take, the longest of which, m, has a bound, m.
+    pub fn share(&self, step: usize, longest: f64, bound: f64) -> f64 {
+        let (narrows, usual) = (self.secant.is_on && !self.snaps, self.steps()[1]);
+        let bound = bound.min(if narrows { LONGEST_SECANT_STEP } else { LONGEST_STEP } * self.radius);
+        let shortened = match step < usual {
+            true => 1.0,
+            false if narrows => 0.5f64.powi((step + 1 - usual) as i32),
+            false => 0.5,
+        };
+        if longest > bound { (bound / longest).min(shortened) } else { shortened }
+    }
+
+    /// Whether the last whole steps, of which the longest is given, m, show that there is no result.
+    pub fn has_diverged(&self, longest: f64) -> bool {
+        let allowed = if self.secant.is_on { EDGE_STEP } else { DIVERGED_STEP };
+        !self.cells && longest > allowed * self.radius
+    }
+}

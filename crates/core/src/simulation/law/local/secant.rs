@@ -1,0 +1,113 @@
+//! Secant corrections of Newton's method where its steps go to and fro.
+//!
+//! The Jacobian has no derivative of the slope `f^T (dC_reg/dp') f / 2` by the position. Under a deep tool, whose displacement `u` is
+//! as long as that over which `C_reg` changes along the surface, it counts: a whole step along the surface goes `1 + u^2 C''/(2 C)`
+//! times as far as it should, and beyond 2 the steps grow. What is missing follows from the residuals before and after a step
+//! (Broyden, Math. Comp. 19, 1965, 577-593). With a share `w` of the step that would remove the residual `r_0`,
+//!
+//! ```text
+//! B <- B + (r_1 - (1 - w) r_0) s^T / |s|^2        s the step that was taken
+//! ```
+//!
+//! for each contact by itself: the slope is that of its own place.
+
+use glam::{DMat3, DVec3};
+
+use crate::simulation::MAX_CONTACTS;
+use crate::tensor::outer;
+
+/// First step that is compared with the one before: the first ones correct the extrapolation.
+const FIRST: usize = 3;
+/// A step that goes back by more than this part of the one before goes to and fro.
+const TURNED_BACK: f64 = 0.3;
+
+/// What the steps of one solution have shown.
+#[derive(Default)]
+pub struct Secant {
+    /// Whether steps have gone to and fro.
+    pub is_on: bool,
+    /// Residuals before the last steps, m, the steps, m, and their share of whole ones.
+    residuals: [DVec3; MAX_CONTACTS],
+    steps: [DVec3; MAX_CONTACTS],
+    share: f64,
+    corrections: [DMat3; MAX_CONTACTS],
+}
+
+impl Secant {
+    /// Takes the residuals after the last steps, m.
+    pub fn observe(&mut self, residuals: &[DVec3]) {
+        for (a, &residual) in residuals.iter().enumerate() {
+            let (step, expected) = (self.steps[a], self.residuals[a] * (1.0 - self.share));
+            if self.is_on && step != DVec3::ZERO {
+                self.corrections[a] += outer(residual - expected, step) * (1.0 / step.length_squared());
+            }
+            self.residuals[a] = residual;
+        }
+    }
+
+    /// What the matrix of a contact lacks; `None` where no step has gone to and fro.
+    pub fn correction(&self, contact: usize) -> Option<&DMat3> {
+        self.is_on.then(|| &self.corrections[contact])
+    }
+
+    /// Compares whole steps with those taken before.
+    pub fn compare(&mut self, step: usize, whole: &[DVec3]) {
+        let products = whole.iter().zip(&self.steps).map(|(now, before)| (now.dot(*before), before.length_squared()));
+        let (along, squared) = products.fold((0.0, 0.0), |sum, (a, b)| (sum.0 + a, sum.1 + b));
+        self.is_on |= step >= FIRST && along < -TURNED_BACK * squared;
+    }
+
+    /// Takes note of steps, a share of the whole ones.
+    pub fn take(&mut self, steps: &[DVec3], share: f64) {
+        self.steps[..steps.len()].copy_from_slice(steps);
+        self.share = share;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Residual of which the matrix of the method is the identity.
+    fn residual(at: DVec3) -> DVec3 {
+        let curved = 3.2 * at.x + 40.0 * at.x * at.x;
+        DVec3::new(curved + 0.2 * at.y, 0.2 * at.x + at.y, 1.5 * at.z)
+    }
+
+    /// Steps until the residual is below 1e-12.
+    fn steps_from(mut at: DVec3, with_corrections: bool) -> Option<usize> {
+        let mut secant = Secant::default();
+        for step in 0..40 {
+            let now = residual(at);
+            if now.length() < 1e-12 {
+                return Some(step);
+            }
+            secant.observe(&[now]);
+            let correction = secant.correction(0).filter(|_| with_corrections).copied().unwrap_or(DMat3::ZERO);
+            let whole = (DMat3::IDENTITY + correction).inverse() * -now;
+            secant.compare(step, &[whole]);
+            let share = (0.02 / whole.length()).min(1.0);
+            secant.take(&[whole * share], share);
+            at += whole * share;
+        }
+        None
+    }
+
+    #[test]
+    fn steps_that_grow_converge_with_corrections_only() {
+        let from = DVec3::new(1e-4, 2e-4, -1e-4);
+        assert_eq!(steps_from(from, false), None);
+        assert!(steps_from(from, true).is_some_and(|steps| steps < 20), "{:?}", steps_from(from, true));
+    }
+
+    #[test]
+    fn nothing_is_corrected_before_steps_go_to_and_fro() {
+        let mut secant = Secant::default();
+        for (step, length) in [1e-3, 1e-4, 1e-6, 1e-9].into_iter().enumerate() {
+            secant.observe(&[DVec3::X * length]);
+            secant.compare(step, &[DVec3::X * -length]);
+            secant.take(&[DVec3::X * -length], 1.0);
+        }
+        assert!(secant.correction(0).is_none());
+    }
+}
