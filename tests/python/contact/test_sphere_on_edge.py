@@ -143,7 +143,7 @@ def test_the_direct_solution_is_that_of_the_tables():
 
 @pytest.mark.slow
 def test_the_direct_solution_loses_energy_over_the_edge_by_its_steps():
-    """Pressed one radius deep on the top, and carried over the edge until nothing touches: as docs/accuracy.md has it."""
+    """Pressed one radius deep on the top, and carried over the edge until nothing touches, as in docs/accuracy.md."""
     radius = 3e-3
     contact = edge_block.direct_contact(0.0, Region(4 * radius, 3.2 * radius, 2.4 * radius, 0.9e-3))
     lost = {}
