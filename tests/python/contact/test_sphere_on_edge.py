@@ -143,15 +143,15 @@ def test_the_direct_solution_is_that_of_the_tables():
 
 @pytest.mark.slow
 def test_the_direct_solution_loses_energy_over_the_edge_by_its_steps():
-    """Pressed one radius deep on the top, carried over the edge and out: as docs/accuracy.md has it."""
+    """Pressed one radius deep on the top, and carried over the edge until nothing touches, as in docs/accuracy.md."""
     radius = 3e-3
     contact = edge_block.direct_contact(0.0, Region(4 * radius, 3.2 * radius, 2.4 * radius, 0.9e-3))
     lost = {}
-    for steps in (20, 60):
+    for steps in (20, 40):
         first, down = np.array([-2 * radius, 0.0, radius]), np.linspace(0, radius, steps + 1)
-        along = np.linspace(0, 3.5 * radius, int(3.5 * steps) + 1)[1:]
+        along = np.linspace(0, 3.2 * radius, int(3.2 * steps) + 1)[1:]
         path = np.vstack([first - down[:, None] * UP, first - radius * UP + along[:, None] * [1.0, 0.0, 0.0]])
         forces = contact.press(edge_block.sphere(radius), path, Rotation.identity(), rounds=60)
         put_in = np.cumsum(-0.5 * np.einsum("ij,ij->i", forces[1:] + forces[:-1], np.diff(path, axis=0)))
         lost[steps] = put_in[-1] / put_in.max()
-    assert 0.14 < lost[20] < 0.19 and 0.08 < lost[60] < 0.11, lost
+    assert 0.14 < lost[20] < 0.21 and 0.08 < lost[40] < 0.8 * lost[20], lost

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::response::LocalResponse;
 use super::secant::Secant;
 use super::snap::SNAP_STEPS;
 
@@ -50,9 +51,12 @@ impl Pace {
     }
 
     /// Takes whole steps, and whether a contact is unstable.
-    pub fn observe(&mut self, step: usize, whole: &[DVec3], unstable: bool) {
+    ///
+    /// With higher orders of the body's displacement nothing is learned from residuals: their slope follows the force too slowly, so
+    /// that the residual at a position depends on the steps before.
+    pub fn observe(&mut self, step: usize, whole: &[DVec3], unstable: bool, responses: &[LocalResponse]) {
         self.snaps |= unstable;
-        if !self.cells {
+        if !self.cells && !responses.iter().any(LocalResponse::has_higher_orders) {
             self.secant.compare(step, whole);
         }
     }

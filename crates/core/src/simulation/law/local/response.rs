@@ -294,6 +294,11 @@ impl LocalResponse {
         }
     }
 
+    /// Whether the body's displacement has higher orders here.
+    pub fn has_higher_orders(&self) -> bool {
+        self.series.is_some()
+    }
+
     /// Higher orders of the body's displacement at a force, N.
     fn higher_orders_at(&self, force: DVec3) -> HigherOrders {
         let at = |series| higher_orders(series, (self.foot.normal, &self.foot.turning), force, self.scale);

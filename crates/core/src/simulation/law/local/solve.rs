@@ -194,7 +194,7 @@ fn solve_equations(
             }
         }
         let (longest, unstable) = newton_step(local, system, slots.len(), &mut pace);
-        pace.observe(step, &local.steps[..slots.len()], unstable);
+        pace.observe(step, &local.steps[..slots.len()], unstable, &local.responses[..slots.len()]);
         let longest = if cells { local.lengthen_by_power_law(slots.len()) } else { longest };
         let share = pace.share(step, longest, trust.longest_step);
         if share < 1.0 {
