@@ -53,6 +53,8 @@ def replay(
             open_replay(recording, given, host=host, port=port, browser=browser)
             return
         replayed = simulation.replay(recording, given, progress=True)
+        if replayed.ticks == 0:
+            raise SceneError("no tick of it can be computed again: the file was cut short, or nothing was recorded")
     except SceneError as error:
         raise SceneError(f"{file}: {error}") from error
     print(_report_text(file, recording, replayed))

@@ -205,7 +205,9 @@ def _changed(table: Any, values: Mapping[str, Any]) -> Any:
     except ValidationError as error:
         first = error.errors()[0]
         reason = first["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
-        raise SceneError(f"{FLAGS[str(first['loc'][0])]}: {reason}") from None
+        # What a validator of the whole table refuses has no place: it is one of the values.
+        key = str(first["loc"][0]) if first["loc"] else next(iter(values))
+        raise SceneError(f"{FLAGS[key]}: {reason}") from None
 
 
 def _radii(tool: Any, radius: str) -> dict[str, float]:

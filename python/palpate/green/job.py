@@ -88,6 +88,7 @@ class Job:
             target = Path(path)
             require_writable(target, StoreError)
             target = destination(target, StoreError)
+            _require_store(target)
         remove_leftovers(target)
         first_ranks = np.searchsorted(body.mesh.surface_nodes, nodes).astype(np.uint32)
         return cls(body, region, problem, first_ranks, key, target, precision)
@@ -137,3 +138,14 @@ class Job:
         in_stages = 0 < len(self.first) < len(self.region)
         require_room(self.target, 3 * len(self.region), self.rows, self.precision or "f16", in_stages)
         return available_memory() if memory is None else allowed_memory(memory)
+
+
+def _require_store(path: Path) -> None:
+    """Refuse to overwrite what is no store; a damaged one is written anew."""
+    if not path.exists() or path.stat().st_size == 0:
+        return
+    with path.open("rb") as file:
+        start = file.read(64)
+    # Length of the header, and the header in JSON, as of safetensors.
+    if not start[8:].startswith(b'{"__metadata__"'):
+        raise StoreError(f"{path}: exists, and is no store: give another name, or delete it first")

@@ -233,8 +233,20 @@ class _Builder:
             with progress_reporter("precomputing what is touched first", progress) as report:
                 return background.wait(report)
 
+    def _require_materials(self) -> None:
+        """Look at the materials of parts, before a surface is filled for them."""
+        base: MaterialTable = self._table_of_body("material")[0]
+        regions, where = self._table_of_body("region")
+        tables = [([*where, rank], region) for rank, region in enumerate(regions)]
+        segments = enumerate(self._table.segment)
+        tables += [(["body", self._rank, "segment", rank], segment) for rank, segment in segments]
+        for place, table in tables:
+            with self._locating_errors(place):
+                table.material(base)
+
     def require_files(self) -> None:
         """Look at what building would read; a surface that is yet to be filled only by itself."""
+        self._require_materials()
         table = self._table
         if table.store is not None:
             self.build(False, None)
@@ -306,6 +318,7 @@ class _Builder:
         return locating_errors(self._scene, place, None) if self._scene.source[1] else contextlib.nullcontext()
 
     def mesh(self) -> TetMesh:
+        self._require_materials()
         with self._locating_errors_in_file(["body", self._rank, "model" if self._table.model is not None else "mesh"]):
             return self._read_mesh()
 

@@ -32,6 +32,8 @@ Law = Literal["linear", "neo-hookean", "mooney-rivlin", "yeoh"]
 # Young's modulus, Pa, and law of a scene that gives none. At small strain the law is linear elasticity.
 DEFAULT_MODULUS = 10e3
 DEFAULT_LAW: Law = "neo-hookean"
+# Laws whose constants give the modulus, and those constants.
+LAWS_OF_CONSTANTS, CONSTANTS = ("mooney-rivlin", "yeoh"), {"c10", "c01", "c20", "c30"}
 
 
 class MaterialTable(Table):
@@ -56,7 +58,10 @@ class MaterialTable(Table):
 
     @model_validator(mode="after")
     def _one_material(self) -> MaterialTable:
-        self.material()
+        try:
+            self.material()
+        except BodyError as error:
+            raise ValueError(str(error)) from None
         return self
 
     def material(self) -> Material:
@@ -140,7 +145,7 @@ class PartMaterialTable(Table):
     """Material of a part of the body; what it does not give is that of ``[material]``."""
 
     youngs_modulus: Pressure | None = None
-    """Young's modulus of the part. Default: that of `[material]`."""
+    """Young's modulus of the part; constants of `[material]` are scaled to it. Default: that of `[material]`."""
     poissons_ratio: PoissonsRatio | None = None
     """Poisson's ratio of the part, below 0.5. Default: that of `[material]`."""
     density: Density | None = None
@@ -183,8 +188,12 @@ def _completed(table: PartMaterialTable, base: MaterialTable) -> Material:
         given = {
             name: value for name, value in given.items() if name in ("poissons_ratio", "density", "youngs_modulus")
         }
-        if own["law"] in ("mooney-rivlin", "yeoh"):
+        if own["law"] in LAWS_OF_CONSTANTS:
             given.pop("youngs_modulus", None)
+    elif given.get("law") in LAWS_OF_CONSTANTS and "youngs_modulus" in own and not own.keys() & CONSTANTS:
+        # The same rubber, but stiffer or softer.
+        share = own.pop("youngs_modulus") / _material(given).youngs_modulus
+        own |= {name: share * value for name, value in given.items() if name in CONSTANTS}
     return _material(given | own)
 
 
@@ -193,7 +202,4 @@ def _material(given: dict[str, Any]) -> Material:
     given = {"law": DEFAULT_LAW} | given
     if given["law"] in ("linear", "neo-hookean"):
         given = {"youngs_modulus": DEFAULT_MODULUS} | given
-    try:
-        return Material(**given)
-    except BodyError as error:
-        raise ValueError(str(error)) from None
+    return Material(**given)

@@ -53,7 +53,9 @@ class Directions:
     def targets(self) -> tuple[np.ndarray, np.ndarray]:
         """Targets (k, n) and weights (t, k) of at most one in magnitude, as sliders of other programs have them."""
         count = len(self._basis)
-        weights = np.array([np.pad(row, (0, count - len(row))) for row in self._weights]).reshape(-1, count)
+        weights = np.array([np.pad(row, (0, count - len(row))) for row in self._weights]).reshape(
+            len(self._weights), count
+        )
         largest = np.abs(weights).max(axis=0, initial=np.finfo(float).tiny)
         return self._basis * largest[:, None], weights / largest
 

@@ -17,7 +17,7 @@ from palpate.atomic import written_beside
 from palpate.dynamics import Energy
 from palpate.equality import ComparedByValue
 from palpate.errors import SceneError
-from palpate.input_file import require_file
+from palpate.input_file import require_file, require_writable
 from palpate.simulation.about import require_readable, shown_of
 
 LOG_DTYPE = np.dtype(
@@ -160,10 +160,13 @@ class Recording(ComparedByValue):
 
         Raises
         ------
+        SceneError
+            There is no folder to put it in, or a folder has that name.
         OSError
             The file cannot be written; nothing is left of it.
 
         """
+        require_writable(Path(path), SceneError)
         data = self.source if isinstance(self.source, bytes) else self.source.read_bytes()
         with written_beside(Path(path)) as partial:
             partial.write_bytes(data)

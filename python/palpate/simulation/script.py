@@ -22,15 +22,18 @@ def positions_of(positions: Any, tools: int) -> np.ndarray:
     Raises
     ------
     SceneError
-        Another shape, or more tools than the scene has.
+        Another shape, no tick, more tools than the scene has, or infinite positions.
 
     """
     path = number_array(positions, "positions")
-    if path.ndim not in (2, 3) or path.shape[-1] != 3:
+    if path.ndim not in (2, 3) or path.shape[-1] != 3 or path.size == 0:
         raise SceneError(f"positions must have shape (ticks, 3) or (ticks, tools, 3), got {path.shape}")
     path = path[:, None] if path.ndim == 2 else path
     if path.shape[1] > tools:
         raise SceneError(f"positions of {path.shape[1]} tools, the scene has {tools}")
+    infinite = np.argwhere(np.isinf(path).any(axis=(1, 2)))
+    if len(infinite):
+        raise SceneError(f"position {infinite[0, 0]} is infinite; NaN takes a tool out of the scene")
     return path
 
 

@@ -112,6 +112,9 @@ def test_a_killed_process_loses_a_tenth_of_a_second(block, tmp_path, shared_cach
     assert np.array_equal(cut.ticks, np.arange(len(cut.ticks)))
     again = run("replay", "killed.mcap", "--headless", cwd=tmp_path)
     assert again.returncode == 0 and "note: the file was cut short" in again.stdout
+    # One without a tick has the same bits as anything.
+    (tmp_path / "head.mcap").write_bytes((tmp_path / "killed.mcap").read_bytes()[:3000])
+    refused(run("replay", "head.mcap", "--headless", cwd=tmp_path), "head.mcap", "no tick of it can be computed again")
 
 
 @pytest.mark.slow

@@ -188,7 +188,9 @@ def test_a_partial_with_all_columns_only_has_to_be_written(tmp_path):
 
 
 def test_a_partial_of_other_stages_is_used(tmp_path):
-    body = palpate.Body(box_mesh(cells=(12, 9, 9)), material=palpate.Material(1e4, 0.4), fixed=lambda p: p[:, 0] < 1e-9)
+    body = palpate.Body(
+        box_mesh(cells=(20, 14, 14)), material=palpate.Material(1e4, 0.4), fixed=lambda p: p[:, 0] < 1e-9
+    )
     path = tmp_path / "a.palpate"
 
     class Enough(Exception):

@@ -151,6 +151,14 @@ def test_an_animation_for_other_programs(frames, recording, built, tmp_path):
     assert len(scene.geometry) == 5 and scene.bounds[1, 1] > 0.05, "y is up"
 
 
+def test_a_body_that_nothing_touches_is_exported_too(built, tmp_path):
+    recording = palpate.Simulation(built).play(np.tile([0.0, 0.0, 1.0], (100, 1)))
+    (file,) = palpate.export(recording, tmp_path / "still.glb", rate=RATE, scene=built)
+    gltf = pygltflib.GLTF2().load_binary(file)
+    (mesh,) = [gltf.meshes[node.mesh] for node in gltf.nodes if node.name == "block"]
+    assert not mesh.primitives[0].targets and not mesh.weights
+
+
 def test_a_film_for_slides(recording, built, tmp_path):
     import imageio_ffmpeg
 

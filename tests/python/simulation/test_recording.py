@@ -73,6 +73,20 @@ def test_one_tool_keeps_its_shape(built, tmp_path):
     assert loaded == recording and loaded.forces.shape == loaded.positions.shape == (50, 3)
 
 
+def test_scripts_and_files_that_cannot_be_are_refused(built, tmp_path):
+    simulation = palpate.Simulation(built)
+    for play in (simulation.run, simulation.play):
+        with pytest.raises(palpate.SceneError, match=r"positions must have shape .*got \(0, 3\)"):
+            play(np.zeros((0, 3)))
+    far = paths(5)
+    far[3, 0, 1] = np.inf
+    with pytest.raises(palpate.SceneError, match="position 3 is infinite"):
+        simulation.play(far)
+    recording = simulation.play(paths(5))
+    with pytest.raises(palpate.SceneError, match="there is no folder"):
+        recording.save(tmp_path / "nowhere" / "a.mcap")
+
+
 def session(simulation: palpate.Simulation, seconds: float = 0.5) -> None:
     """Press by hand, as it were."""
     begun = time.monotonic()

@@ -1,0 +1,74 @@
+"""Materials with constants, and stores beside a user's own files, on the command line."""
+
+from __future__ import annotations
+
+import pytest
+from command_line import refused, run
+from conftest import box_mesh
+
+import palpate
+
+SCENE = """[body]
+mesh = "box.vtu"
+unit = "m"
+[supports]
+fixed = "z < min + 1mm"
+[material]
+"""
+RUBBER = 'law = "mooney-rivlin"\nc10 = "1kPa"\nc01 = "2kPa"\n'
+REGION = '[[region]]\nshape = "box"\nlow = [-1, -1, -1]\nhigh = [1, 1, 1]\n'
+
+
+@pytest.fixture
+def box(tmp_path):
+    mesh = box_mesh((3, 3, 3))
+    palpate.TetMesh(mesh.nodes, mesh.tets).write(tmp_path / "box.vtu")
+    return tmp_path
+
+
+@pytest.mark.parametrize("name", ["box.vtu", "notes.txt"])
+def test_a_store_takes_the_place_of_no_other_file(box, name):
+    (box / "notes.txt").write_text("what I have written by hand")
+    before = (box / name).read_bytes()
+    found = run("precompute", "box.vtu", "--unit", "m", "--fix", "z < min + 1mm", "-o", name, cwd=box)
+    refused(found, name, "exists, and is no store")
+    assert (box / name).read_bytes() == before
+
+
+def test_a_store_takes_the_place_of_a_store_damaged_or_not(box):
+    again = ("precompute", "box.vtu", "--unit", "m", "--fix", "z < min + 1mm", "-o", "a.palpate")
+    assert run(*again, cwd=box).returncode == 0
+    whole = (box / "a.palpate").read_bytes()
+    (box / "a.palpate").write_bytes(whole[: len(whole) // 2])
+    assert run(*again, cwd=box).returncode == 0
+    assert (box / "a.palpate").read_bytes() == whole
+
+
+@pytest.mark.parametrize(
+    ("material", "region", "words"),
+    [
+        (RUBBER, 'c20 = "9kPa"', "'c20' does not belong to law 'mooney-rivlin'"),
+        ('law = "yeoh"\nc10 = "1kPa"\n', 'law = "mooney-rivlin"', "needs c10"),
+        ("", 'c10 = "1kPa"', "'c10' does not belong to law 'neo-hookean'"),
+    ],
+)
+def test_a_wrong_material_of_a_region_is_one_line(box, material, region, words):
+    (box / "scene.toml").write_text(f"{SCENE}{material}{REGION}{region}\n")
+    line = (SCENE + material).count("\n") + 1
+    for command in ("info", "precompute"):
+        refused(run(command, "scene.toml", cwd=box), f"scene.toml:{line}: region", words)
+
+
+def test_constants_of_a_region_follow_its_modulus(box):
+    """E of a Mooney-Rivlin solid at small strain is 4 (1 + nu) (c10 + c01)."""
+    (box / "scene.toml").write_text(f'{SCENE}{RUBBER}{REGION}youngs_modulus = "34.8kPa"\n')
+    found = run("info", "scene.toml", cwd=box)
+    assert "material.youngs_modulus = 17400.0" in found.stdout
+    scene = palpate.Scene.read(box / "scene.toml")
+    part = scene.region[0].material(scene.material)
+    assert (part.c10, part.c01) == pytest.approx((2e3, 4e3)) and part.youngs_modulus == pytest.approx(34.8e3)
+
+
+def test_a_modulus_that_constants_give_is_not_typed(box):
+    (box / "scene.toml").write_text(SCENE + RUBBER)
+    refused(run("run", "scene.toml", "-E", "3kPa", "--headless", "0.1", cwd=box), "-E: law 'mooney-rivlin'", "17400 Pa")
