@@ -6,6 +6,10 @@ import os
 import signal
 import sys
 import threading
+from types import FrameType
+
+# An interrupt within an import comes again after this time, s.
+AGAIN = 0.02
 
 
 def end_quietly_when_interrupted() -> None:
@@ -16,9 +20,9 @@ def end_quietly_when_interrupted() -> None:
 
 
 def restore_interrupts() -> None:
-    """Let Ctrl-C raise KeyboardInterrupt again."""
-    if signal.getsignal(signal.SIGINT) is _end:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+    """Let Ctrl-C raise KeyboardInterrupt again, but not within an import: that is over first."""
+    if signal.getsignal(signal.SIGINT) in (_end, signal.default_int_handler):
+        signal.signal(signal.SIGINT, _interrupt)
 
 
 def _is_command_line() -> bool:
@@ -31,3 +35,23 @@ def _end(*_signal: object) -> None:
     # Nothing has begun that would have to be ended in order.
     os.write(2, b"palpate: interrupted\n")
     os._exit(130)
+
+
+def _interrupt(_signal: int, frame: FrameType | None) -> None:
+    # Modules that try whether others are there take any exception for an answer, and the command would go on.
+    while frame is not None:
+        if frame.f_code.co_filename == "<frozen importlib._bootstrap>":
+            again = threading.Timer(AGAIN, _interrupt_main_thread)
+            again.daemon = True
+            again.start()
+            return
+        frame = frame.f_back
+    raise KeyboardInterrupt
+
+
+def _interrupt_main_thread() -> None:
+    if sys.platform == "win32":
+        signal.raise_signal(signal.SIGINT)
+    else:
+        # A signal of this thread would not wake the other one from what it waits for.
+        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)

@@ -35,6 +35,31 @@ def test_an_interrupt_while_modules_are_imported_is_one_line(tmp_path):
     assert (process.returncode, output) == (130, "palpate: interrupted\n")
 
 
+def test_an_interrupt_within_an_import_of_a_command_is_not_swallowed(tmp_path):
+    """As by modules that try whether others are there."""
+    (tmp_path / "tried.py").write_text("import time; open('importing', 'w').close(); time.sleep(1)")
+    (tmp_path / "trying.py").write_text("try:\n    import tried\nexcept BaseException:\n    pass\n")
+    program = """
+        import sys, time
+        from palpate import cli
+
+        @cli.app.app.command()
+        def wait():
+            import trying
+            time.sleep(60)
+
+        sys.argv = ["palpate", "wait"]
+        cli.main()
+    """
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path])}
+    command = [sys.executable, "-c", HEEDING, sys.executable, "-c", textwrap.dedent(program)]
+    process = subprocess.Popen(command, cwd=tmp_path, env=environment, stderr=subprocess.PIPE, text=True)
+    awaited(tmp_path / "importing", process)
+    process.send_signal(signal.SIGINT)
+    _, output = process.communicate(timeout=20)
+    assert process.returncode == 130 and "Traceback" not in output
+
+
 @pytest.mark.parametrize(("end", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
 def test_unfinished_work_is_removed_when_the_command_line_is_ended(tmp_path, end, code):
     program = """
