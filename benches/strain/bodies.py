@@ -18,6 +18,7 @@ from benches.strain.cylinders import RADIUS, references
 from benches.strain.materials import NeoHookean
 from benches.strain.refined import refined
 from benches.strain.solid import Solid
+from palpate.mesh.triangles import node_normals
 from palpate.validation.verify.contact.reference import graded
 from palpate.validation.verify.grids import lattice, mapped
 
@@ -151,7 +152,7 @@ def liver(places: int) -> Iterator[Pressed]:
     """
     mesh = palpate.models.liver()
     rng = np.random.default_rng(5)
-    normals = vertex_normals(mesh)
+    normals = node_normals(mesh.nodes, mesh.surface_triangles)
     corners = np.unique(mesh.tets[:, :4])
     front = mesh.surface_nodes[normals[mesh.surface_nodes, 1] < -0.7]
     upper = np.intersect1d(front, corners)
@@ -160,22 +161,10 @@ def liver(places: int) -> Iterator[Pressed]:
         place, normal = mesh.nodes[node], normals[node]
         finer = refined(mesh, place, LIVER_REACHES)
         case = Pressed(f"liver, node {node}", finer, _lying(finer), place, normal, depths)
-        full = case.full()
-        yield replace(case, forces=full)
-        yield replace(case, name=f"{case.name}, own elements", mesh=mesh, held=_lying(mesh), forces=full)
+        yield case
+        yield replace(case, name=f"{case.name}, own elements", mesh=mesh, held=_lying(mesh), forces=case.full())
 
 
 def _lying(liver: palpate.TetMesh) -> np.ndarray:
     """Return what is held of a liver that lies on its back, as in the demo."""
     return np.repeat((liver.nodes[:, 1] > 0.02)[:, None], 3, axis=1)
-
-
-def vertex_normals(mesh: palpate.TetMesh) -> np.ndarray:
-    """Return outward unit normals (n, 3) at surface nodes, zero elsewhere."""
-    normals = np.zeros_like(mesh.nodes)
-    corners = mesh.nodes[mesh.surface_triangles]
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    for k in range(3):
-        np.add.at(normals, mesh.surface_triangles[:, k], across)
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.divide(normals, length, out=np.zeros_like(normals), where=length > 0.0)

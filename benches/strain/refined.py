@@ -9,7 +9,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 import palpate
-from benches.strain.solid import EDGES
+from palpate.mesh.elements import EDGES
+from palpate.mesh.shape_functions import values
 
 # Elements in which a point is looked for, by the distance of their middles.
 CANDIDATES = 60
@@ -30,10 +31,8 @@ def refined(mesh: palpate.TetMesh, place: np.ndarray, reaches: Sequence[float]) 
     for reach in reaches:
         middles = divided.p[:, divided.t].mean(axis=1).T
         divided = divided.refined(np.flatnonzero(np.linalg.norm(middles - place, axis=1) < reach))
-    points, tets = divided.p.T, divided.t.T
-    edges, numbers = np.unique(np.sort(tets[:, EDGES].reshape(-1, 2), axis=1), axis=0, return_inverse=True)
-    straight = np.vstack([points, points[edges].mean(axis=1)])
-    return palpate.TetMesh(_curved(mesh, straight), np.hstack([tets, len(points) + numbers.reshape(-1, len(EDGES))]))
+    straight = palpate.TetMesh(divided.p.T, divided.t.T).to_quadratic()
+    return palpate.TetMesh(_curved(mesh, straight.nodes), straight.tets)
 
 
 def _curved(mesh: palpate.TetMesh, points: np.ndarray) -> np.ndarray:
@@ -48,5 +47,4 @@ def _curved(mesh: palpate.TetMesh, points: np.ndarray) -> np.ndarray:
     rows = np.arange(len(points))
     at = barycentric[rows, chosen]
     assert at.min() > -1e-9, "a point outside of the elements that are near it"
-    shapes = np.hstack([at * (2.0 * at - 1.0), *(4.0 * at[:, [a]] * at[:, [b]] for a, b in EDGES)])
-    return np.einsum("na,nai->ni", shapes, mesh.nodes[mesh.tets[candidates[rows, chosen]]])
+    return np.einsum("na,nai->ni", values(at, 10, EDGES), mesh.nodes[mesh.tets[candidates[rows, chosen]]])

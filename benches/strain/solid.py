@@ -14,6 +14,7 @@ from scipy.sparse.linalg import splu
 from benches.strain.axisymmetric import DivergedError
 from benches.strain.materials import Material
 from palpate import TetMesh
+from palpate.mesh.elements import EDGES
 
 try:
     from pypardiso import PyPardisoSolver
@@ -34,8 +35,6 @@ FACE_POINTS = 6
 
 _A, _B = 0.5854101966249685, 0.1381966011250105
 _POINTS = np.array([[_B, _B, _B], [_A, _B, _B], [_B, _A, _B], [_B, _B, _A]])
-# Corners of the edges whose middles are the nodes 4 to 9.
-EDGES = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
 
 
 class Solid:

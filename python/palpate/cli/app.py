@@ -213,13 +213,9 @@ def info(
         scene.require_files()
         print(f"{file}: scene of {scene.name}")
         entries = scene.model_dump(by_alias=True, exclude_none=True)
-        tables = [
-            (scene.material, entries),
-            *zip((body.material for body in scene.bodies), entries["body"], strict=True),
-        ]
-        for table, entry in tables:
-            if table is not None:  # the modulus may be that of the law's constants
-                entry["material"]["youngs_modulus"] = table.material().youngs_modulus
+        for owner, entry in zip([scene, *scene.bodies], [entries, *entries["body"]], strict=True):
+            if owner.material is not None:  # the modulus may be that of the law's constants
+                entry["material"]["youngs_modulus"] = owner.material.material().youngs_modulus
         for name, value in entries.items():
             _print_entry(name, value)
         if any(tool.radius is None or tool.contact_radius is None for tool in scene.tools):

@@ -53,9 +53,9 @@ class Directions:
     def targets(self) -> tuple[np.ndarray, np.ndarray]:
         """Targets (k, n) and weights (t, k) of at most one in magnitude, as sliders of other programs have them."""
         count = len(self._basis)
-        weights = np.array([np.pad(row, (0, count - len(row))) for row in self._weights]).reshape(
-            len(self._weights), count
-        )
+        weights = np.zeros((len(self._weights), count))
+        for padded, row in zip(weights, self._weights, strict=True):
+            padded[: len(row)] = row
         largest = np.abs(weights).max(axis=0, initial=np.finfo(float).tiny)
         return self._basis * largest[:, None], weights / largest
 

@@ -368,8 +368,9 @@ class ViewerServer:
 
     async def send_all(self, message: dict[str, Any] | None, but_control: bool = False) -> None:
         """Send a message to all pages, or to those that watch; None is no message."""
-        for client in [c for c in self._clients if message and not (but_control and c is self._controller)]:
-            await client.send(message)
+        if message is not None:
+            for client in [c for c in self._clients if not (but_control and c is self._controller)]:
+                await client.send(message)
 
     async def send_control(self, message: dict[str, Any]) -> None:
         """Send a message to the page in control."""

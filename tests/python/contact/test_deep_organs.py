@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import palpate
+from palpate.mesh.triangles import node_normals
 from palpate.scene import BuiltScene
 from palpate.validation.verify.contact.loop import UNLIMITED, sphere
 
@@ -22,20 +23,12 @@ AROUND = 4.0
 LOST = 0.01
 
 
-def normal_at(mesh: palpate.TetMesh, node: int) -> np.ndarray:
-    """Outward normal of the triangles around a node, by their areas."""
-    triangles = mesh.surface_triangles[(mesh.surface_triangles == node).any(axis=1)]
-    corners = mesh.nodes[triangles]
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).sum(axis=0)
-    return across / np.linalg.norm(across)
-
-
 def pressed(node: int, law: str) -> np.ndarray:
     """Forces along the normal, N, of a press by 20 um a tick."""
     mesh = palpate.models.kidney()
     material = palpate.Material(10e3, 0.45, law=law)
     body = palpate.Body(mesh, material=material, fixed=palpate.models.fixed("kidney", mesh))
-    place, normal = mesh.nodes[node], normal_at(mesh, node)
+    place, normal = mesh.nodes[node], node_normals(mesh.nodes, mesh.surface_triangles)[node]
     near = np.linalg.norm(mesh.nodes[mesh.surface_nodes] - place, axis=1) < AROUND * RADIUS
     green = palpate.precompute(body, touch=mesh.surface_nodes[near], progress=False)
     scene = palpate.Scene(

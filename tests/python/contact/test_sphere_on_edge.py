@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 import palpate
 from palpate.scene import BuiltScene
 from palpate.validation.verify.contact.loop import UNLIMITED
+from palpate.validation.verify.contact.measures import given_out
 
 RADIUS, ELEMENT, STEP = 6e-3, 6e-3, 10e-6
 DEPTHS = np.array([1e-3, 2e-3, 3e-3])
@@ -152,6 +153,6 @@ def test_the_direct_solution_loses_energy_over_the_edge_by_its_steps():
         along = np.linspace(0, 3.2 * radius, int(3.2 * steps) + 1)[1:]
         path = np.vstack([first - down[:, None] * UP, first - radius * UP + along[:, None] * [1.0, 0.0, 0.0]])
         forces = contact.press(edge_block.sphere(radius), path, Rotation.identity(), rounds=60)
-        put_in = np.cumsum(-0.5 * np.einsum("ij,ij->i", forces[1:] + forces[:-1], np.diff(path, axis=0)))
-        lost[steps] = put_in[-1] / put_in.max()
+        given, peak = given_out(path[None], forces[None])
+        lost[steps] = -given[0] / peak[0]
     assert 0.14 < lost[20] < 0.21 and 0.08 < lost[40] < 0.8 * lost[20], lost

@@ -8,7 +8,7 @@ use super::snap::SNAP_STEPS;
 
 /// Most steps; three or four are usual. From the second number on steps are shortened, each more than the last: in a concavity
 /// about as narrow as the tool the force turns so fast with the position that whole steps oscillate.
-pub const USUAL_STEPS: [usize; 2] = [16, 10];
+const USUAL_STEPS: [usize; 2] = [16, 10];
 /// Most steps with pressure cells; two or three are usual. Each costs a hundred times a closed form.
 pub const MOST_CELL_STEPS: usize = 8;
 /// The same numbers with secant corrections. What goes to and fro in spite of them does so over an element's edge, where the slope
@@ -61,7 +61,7 @@ impl Pace {
         }
     }
 
-    /// Share of whole steps to take, the longest of which, m, has a bound, m.
+    /// Share of the whole steps that is taken. The longest of them, m, becomes no longer than `bound`, m.
     pub fn share(&self, step: usize, longest: f64, bound: f64) -> f64 {
         let (narrows, usual) = (self.secant.is_on && !self.snaps, self.steps()[1]);
         let bound = bound.min(if narrows { LONGEST_SECANT_STEP } else { LONGEST_STEP } * self.radius);
@@ -73,7 +73,7 @@ impl Pace {
         if longest > bound { (bound / longest).min(shortened) } else { shortened }
     }
 
-    /// Whether the last whole steps, of which the longest is given, m, show that there is no result.
+    /// Whether the method has diverged, by the longest of its last whole steps, m.
     pub fn has_diverged(&self, longest: f64) -> bool {
         let allowed = if self.secant.is_on { EDGE_STEP } else { DIVERGED_STEP };
         !self.cells && longest > allowed * self.radius

@@ -350,9 +350,8 @@ impl LocalResponse {
         let stiffness = indentation.tangential * indentation.stiffness;
         let bound = tool.coefficient * pressing;
         self.friction = contact.friction.respond(displacement, bound, tool.coefficient, stiffness, self.normal);
-        self.force = self.friction.force - push;
         // The slope is that at the guess; what the difference changes follows from its derivative.
-        self.force = self.guess.force + by_guess * (self.force - self.guess.force);
+        self.force = self.guess.force + by_guess * (self.friction.force - push - self.guess.force);
         let change = self.force - self.guess.force;
         self.higher = match change.length_squared() < (CLOSE * CLOSE) * self.force.length_squared() {
             true => self.higher_at_guess.moved(change),

@@ -9,7 +9,8 @@
 //! B <- B + (r_1 - (1 - w) r_0) s^T / |s|^2        s the step that was taken
 //! ```
 //!
-//! for each contact by itself: the slope is that of its own place.
+//! for each contact by itself: the slope is that of its own place. `B` begins as the identity, with which the first corrected step is
+//! about half of a whole one.
 
 use glam::{DMat3, DVec3};
 
@@ -30,24 +31,19 @@ pub struct Secant {
     residuals: [DVec3; MAX_CONTACTS],
     steps: [DVec3; MAX_CONTACTS],
     share: f64,
+    /// `B`: a matrix is the identity by default.
     corrections: [DMat3; MAX_CONTACTS],
 }
 
 impl Secant {
-    /// Takes the residuals after the last steps, m.
-    pub fn observe(&mut self, residuals: &[DVec3]) {
-        for (a, &residual) in residuals.iter().enumerate() {
-            let (step, expected) = (self.steps[a], self.residuals[a] * (1.0 - self.share));
-            if self.is_on && step != DVec3::ZERO {
-                self.corrections[a] += outer(residual - expected, step) * (1.0 / step.length_squared());
-            }
-            self.residuals[a] = residual;
+    /// What the matrix of a contact lacks, by its residual after the last step, m; `None` where no step has gone to and fro.
+    pub fn correction(&mut self, contact: usize, residual: DVec3) -> Option<DMat3> {
+        let (step, expected) = (self.steps[contact], self.residuals[contact] * (1.0 - self.share));
+        if self.is_on && step != DVec3::ZERO {
+            self.corrections[contact] += outer(residual - expected, step) * (1.0 / step.length_squared());
         }
-    }
-
-    /// What the matrix of a contact lacks; `None` where no step has gone to and fro.
-    pub fn correction(&self, contact: usize) -> Option<&DMat3> {
-        self.is_on.then(|| &self.corrections[contact])
+        self.residuals[contact] = residual;
+        self.is_on.then_some(self.corrections[contact])
     }
 
     /// Compares whole steps with those taken before.
@@ -68,7 +64,7 @@ impl Secant {
 mod tests {
     use super::*;
 
-    /// Residual of which the matrix of the method is the identity.
+    /// A residual for which the method takes the identity as its matrix.
     fn residual(at: DVec3) -> DVec3 {
         let curved = 3.2 * at.x + 40.0 * at.x * at.x;
         DVec3::new(curved + 0.2 * at.y, 0.2 * at.x + at.y, 1.5 * at.z)
@@ -82,8 +78,7 @@ mod tests {
             if now.length() < 1e-12 {
                 return Some(step);
             }
-            secant.observe(&[now]);
-            let correction = secant.correction(0).filter(|_| with_corrections).copied().unwrap_or(DMat3::ZERO);
+            let correction = secant.correction(0, now).filter(|_| with_corrections).unwrap_or(DMat3::ZERO);
             let whole = (DMat3::IDENTITY + correction).inverse() * -now;
             secant.compare(step, &[whole]);
             let share = (0.02 / whole.length()).min(1.0);
@@ -104,10 +99,10 @@ mod tests {
     fn nothing_is_corrected_before_steps_go_to_and_fro() {
         let mut secant = Secant::default();
         for (step, length) in [1e-3, 1e-4, 1e-6, 1e-9].into_iter().enumerate() {
-            secant.observe(&[DVec3::X * length]);
+            assert!(secant.correction(0, DVec3::X * length).is_none());
             secant.compare(step, &[DVec3::X * -length]);
             secant.take(&[DVec3::X * -length], 1.0);
         }
-        assert!(secant.correction(0).is_none());
+        assert!(secant.correction(0, DVec3::ZERO).is_none());
     }
 }

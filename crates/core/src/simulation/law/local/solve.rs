@@ -380,7 +380,6 @@ fn evaluate_contacts(
 /// cells are bounded by their residuals instead.
 fn newton_step(local: &mut LocalScratch, system: &mut System, count: usize, pace: &mut Pace) -> (f64, bool) {
     let (mut jacobians, mut unstable) = ([DMat3::ZERO; MAX_CONTACTS], false);
-    let mut residuals = [DVec3::ZERO; MAX_CONTACTS];
     for (a, jacobian) in jacobians[..count].iter_mut().enumerate() {
         *jacobian = local.responses[a].jacobian;
         if !pace.cells {
@@ -408,11 +407,7 @@ fn newton_step(local: &mut LocalScratch, system: &mut System, count: usize, pace
             }
         }
         system.right[3 * a..3 * a + 3].copy_from_slice(&(-residual).to_array());
-        residuals[a] = residual;
-    }
-    pace.secant.observe(&residuals[..count]);
-    for a in 0..count {
-        let Some(correction) = pace.secant.correction(a) else { break };
+        let Some(correction) = pace.secant.correction(a, residual) else { continue };
         for row in 0..3 {
             for column in 0..3 {
                 system.matrix[3 * a + row][3 * a + column] += correction.col(column)[row];
