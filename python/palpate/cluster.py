@@ -52,6 +52,7 @@ def connected(dask: str | Client) -> Iterator[Client]:
         return
     if not isinstance(dask, str):
         raise ClusterError(f"dask takes the address of a scheduler, or a distributed.Client; got {brief_repr(dask)}")
+    _require_address(dask)
     with _muted_library_log():
         security = _security_for(dask)
         try:
@@ -67,6 +68,18 @@ def connected(dask: str | Client) -> Iterator[Client]:
                 yield client
         finally:
             client.close()
+
+
+def _require_address(address: str) -> None:
+    """Refuse what is no address: a client that cannot be made prints a traceback when it is deleted."""
+    from distributed.comm.addressing import get_address_host_port
+
+    try:
+        get_address_host_port(address)
+    except ValueError:
+        raise ClusterError(
+            f"'{address}' is no address of a scheduler, such as tcp://10.0.0.1:8786: 'dask scheduler' prints its own"
+        ) from None
 
 
 def _security_for(address: str) -> Security:

@@ -97,7 +97,7 @@ class DeviceWarning(PalpateWarning):
 
 
 class TouchWarning(PalpateWarning):
-    """A touch, or the tool of a run, strains the body beyond what linear elasticity can answer."""
+    """A touch, the tool of a run or the loads of the body strain it beyond what linear elasticity can answer."""
 
 
 class RecordingWarning(PalpateWarning):

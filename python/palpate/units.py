@@ -42,13 +42,17 @@ def quantity(value: str | float, units: dict[str, float], kind: str) -> float:
     match = _QUANTITY.fullmatch(value) if isinstance(value, str) else None
     if match is None:
         shown = f"'{value}'" if isinstance(value, str) else brief_repr(value)
-        raise UnitError(f"{shown} is not a {kind}: write a number and one of {', '.join(units)}")
+        raise UnitError(f"{shown} is not {_article(kind)} {kind}: write a number and one of {', '.join(units)}")
     number, unit = float(match[1]), match[2]
     if unit == "":
         return number
     if unit not in units:
-        raise UnitError(f"unknown unit '{unit}' in '{value}': a {kind} is given in {', '.join(units)}")
+        raise UnitError(f"unknown unit '{unit}' in '{value}': {_article(kind)} {kind} is given in {', '.join(units)}")
     return number * units[unit]
+
+
+def _article(noun: str) -> str:
+    return "an" if noun[0] in "aeiou" else "a"
 
 
 def to_float(value: Real) -> float:

@@ -239,7 +239,8 @@ def test_mistakes_of_a_cluster_are_told_in_a_line(workers, body, tmp_path, monke
 
     monkeypatch.setattr(clusters, "CONNECT_SECONDS", 0.5)
     refuses("tcp://127.0.0.1:1", "no scheduler answers at tcp://127.0.0.1:1")
-    refuses("nonsense", "no scheduler answers at nonsense")
+    for nonsense in ("nonsense", "127.0.0.1", "abc://x:1", ""):
+        refuses(nonsense, f"^'{nonsense}' is no address of a scheduler, such as tcp://")
     refuses(8786, "address of a scheduler")
     refuses(workers.scheduler_address, "already in use", memory="1MB")
     with local_cluster(0) as nobody:

@@ -46,6 +46,8 @@ def test_numbers_of_numpy_are_numbers():
         (lambda green: palpate.Material(1e-300, 0.4), "Young's modulus must lie between .*, got 1e-300 Pa"),
         (lambda green: palpate.Body(box_mesh(), material="10kPa"), "material must be a palpate.Material"),
         (lambda green: palpate.Body(box_mesh(), material={0: 10e3}), "material of a region must be a palpate.Material"),
+        (lambda green: palpate.Loads(gravity=(0, 0, "nan")), "'nan' is not an acceleration"),
+        (lambda green: palpate.Simulation("block.toml"), "takes a palpate.Scene, got 'block.toml': Scene.read reads"),
         (lambda green: palpate.precompute("block"), "precompute takes a palpate.Body"),
         (lambda green: palpate.Loads(gravity="down"), "gravity needs three numbers"),
         (lambda green: palpate.Loads(pressure=200.0), "pressure takes pairs"),
@@ -75,6 +77,8 @@ def test_settings_of_a_running_loop_take_units_and_refuse_the_rest(block, block_
         lambda: simulation.set_strain_limit(None),
         lambda: simulation.run("up and down"),
         lambda: simulation.move("up"),
+        lambda: simulation.move((0, 0, 1), tool="a"),
+        lambda: simulation.stiffness_scale_of("a"),
     ):
         with pytest.raises(palpate.Error):
             call()

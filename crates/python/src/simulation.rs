@@ -318,6 +318,7 @@ impl SimulationCore {
         answer.set_item("compute_ns", recording.compute_ns.into_pyarray(py))?;
         answer.set_item("file", file.map(|file| PyBytes::new(py, &file)))?;
         answer.set_item("fault", recording.fault.map(|fault| fault.to_string()))?;
+        answer.set_item("refused", recording.refused.map(|(tick, refusal)| (tick, refusal.message())))?;
         debug_assert_eq!(poses.len(), ticks * model.tools.len());
         Ok(answer)
     }

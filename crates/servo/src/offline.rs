@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use palpate_core::Result;
+use palpate_core::contact::Refusal;
 use palpate_core::dynamics::Energy;
 use palpate_core::simulation::{Model, Pose, Strike};
 use palpate_devices::{Device, DeviceLimits};
@@ -53,6 +54,8 @@ pub struct Recording {
     pub compute_ns: Vec<u64>,
     /// The first fault that latched.
     pub fault: Option<Fault>,
+    /// The first tick in which a tool reached a body without a contact, and why.
+    pub refused: Option<(usize, Refusal)>,
 }
 
 /// Ticks through a script, settings unchanged but for its strikes, and hands out a record of each tick.
@@ -88,6 +91,8 @@ pub fn run(
         let published = stepper.handle.latest();
         let (status, state) = (&published.status, &published.state);
         recording.fault = recording.fault.or(status.fault);
+        let mut refusals = state.tools[..tools].iter().flat_map(|tool| tool.refused.iter().flatten());
+        recording.refused = recording.refused.or_else(|| refusals.next().map(|&refusal| (tick, refusal)));
         recording.forces.extend(status.wrenches[..tools].iter().map(|wrench| wrench.force));
         recording.limited.extend(&status.limited[..tools]);
         recording.torques.extend(status.wrenches[..tools].iter().map(|wrench| wrench.torque));

@@ -29,6 +29,9 @@ from palpate.startup import restore_interrupts
 if TYPE_CHECKING:
     from palpate.mesh import TetMesh
 
+# Exit code of Ctrl-C, as shells have it.
+INTERRUPTED = 130
+
 app = typer.Typer(help="Finite elements you can feel.", pretty_exceptions_enable=False, rich_markup_mode=None)
 
 
@@ -79,9 +82,12 @@ def run_commands(commands: typer.Typer) -> None:
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
         sys.exit(_print_error(f"{where}{error.strerror or error}"))
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, SystemExit) as ending:
+        # Within a command Typer has made exit code 130 of Ctrl-C, without a message.
+        if isinstance(ending, SystemExit) and ending.code != INTERRUPTED:
+            raise
         print("palpate: interrupted", file=sys.stderr)
-        sys.exit(130)
+        sys.exit(INTERRUPTED)
 
 
 def _terminate(*_signal: object) -> None:

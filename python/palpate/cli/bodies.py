@@ -115,9 +115,10 @@ def segment_tables(typed: Sequence[str] | None) -> list[dict[str, str]]:
     Raises
     ------
     UnitError
-        A modulus that is no pressure.
+        A modulus that is no positive pressure.
 
     """
+    from palpate.errors import UnitError
     from palpate.units import pressure
 
     tables = []
@@ -126,7 +127,8 @@ def segment_tables(typed: Sequence[str] | None) -> list[dict[str, str]]:
         if not sign:
             tables.append({"name": text})
             continue
-        pressure(modulus)
+        if not pressure(modulus) > 0:
+            raise UnitError(f"--segment {text}: a Young's modulus is positive")
         tables.append({"name": name, "youngs_modulus": modulus})
     return tables
 

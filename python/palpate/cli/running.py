@@ -190,6 +190,8 @@ def run(
         _view(None, page)
         return
     if headless is not None:
+        if surface_map is not None:
+            raise typer.BadParameter("--map is shown in the page: leave out --headless")
         built = built_from(file, options)
         _print_cache_use()
         _print_loose(built)

@@ -11,11 +11,13 @@ from palpate.cli.bodies import likely_units
 
 def print_surface(path: Path, unit: str | None) -> None:
     """Print counts, size, volume, whether it can be filled, and the command that does."""
+    from palpate.mesh.surface_state import require_finite
     from palpate.mesh.tetrahedralize import read_surface
     from palpate.units import length_scale
 
     unit, *others = likely_units(path) if unit is None else [unit]
     shape, scale = read_surface(path), length_scale(unit)
+    require_finite(str(path), shape)
     shape.merge_vertices(merge_tex=True, merge_norm=True)
     print(f"{path}: surface of {len(shape.vertices)} vertices, {len(shape.faces)} triangles")
     low, high = 1e3 * scale * shape.bounds

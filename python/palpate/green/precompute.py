@@ -15,7 +15,8 @@ import numpy as np
 from palpate import _native
 from palpate.body import Body, SurfaceRegion, surface_region
 from palpate.cluster import connected
-from palpate.errors import ClusterError, PrecisionWarning, StoreError, StoreWarning
+from palpate.errors import ClusterError, PrecisionWarning, StoreError, StoreWarning, TouchWarning
+from palpate.fields import STRAIN_LIMIT
 from palpate.green.bounds import CHOSEN, WARNED, error_text, remedy
 from palpate.green.claim import claimed, waiting_message
 from palpate.green.function import GreensFunction
@@ -92,6 +93,8 @@ def precompute(
     -----
     PrecisionWarning
         Touches may be wrong by more than 1 %.
+    TouchWarning
+        The body's own loads strain its surface by more than 30 %.
     StoreWarning
         Another process computes the same file, and is waited for; or it had left something that does not belong here.
 
@@ -101,12 +104,12 @@ def precompute(
     job = Job.of(body, precision, touch, first, path)
     stored = job.stored()
     if stored is not None:
-        return _warn_of_inaccuracy(stored)
+        return _with_warnings(stored)
     with _reporting_disk_failures(job.target), claimed(job.target, _warn_once_of_waiting(job.target)) as claim:
         # Whoever had the claim before may have finished it.
         stored = job.stored()
         if stored is not None:
-            return _warn_of_inaccuracy(stored)
+            return _with_warnings(stored)
         job.make_room()
         if dask is None:
             discarded = _in_this_process(job, claim, memory, progress, first is not None, ready, painted)
@@ -122,7 +125,7 @@ def precompute(
         )
     green = job.load()
     job.make_room(written=True)
-    return _warn_of_inaccuracy(green)
+    return _with_warnings(green)
 
 
 def _warn_once_of_waiting(target: Path) -> Callable[[], None]:
@@ -198,9 +201,17 @@ def _watchers(
     return asked, written
 
 
-def _warn_of_inaccuracy(green: GreensFunction) -> GreensFunction:
-    """Warn of a store in which touches may be wrong."""
+def _with_warnings(green: GreensFunction) -> GreensFunction:
+    """Warn of a store in which touches may be wrong, and of loads that crush the body."""
     if not green.touch_error <= WARNED:
         text = f"touches of this body may be wrong by {error_text(green.touch_error)}"
         warnings.warn(f"{text}: {remedy(green.touch_error, green.precision)}", PrecisionWarning, stacklevel=3)
+    strain = green.surface_strain.largest(green.free_displacements)
+    if not strain <= STRAIN_LIMIT:
+        text = f"the body's own loads strain its surface by {100 * strain:.0f} %, beyond {100 * STRAIN_LIMIT:.0f} %"
+        warnings.warn(
+            f"{text}: linear elasticity has no meaning there; check units, stiffness and supports",
+            TouchWarning,
+            stacklevel=3,
+        )
     return green

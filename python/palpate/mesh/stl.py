@@ -46,6 +46,9 @@ def read_stl(path: Path) -> tuple[np.ndarray, np.ndarray]:
         corners = np.frombuffer(content, kind, count, HEADER)["corners"].reshape(-1, 3).astype(np.float64)
     else:
         corners = np.array([[float(x) for x in found] for found in _VERTEX.findall(content)]).reshape(-1, 3)
+    if len(corners) == 0 and count > 0:
+        there = (len(content) - HEADER) // RECORD
+        raise ValueError(f"it is cut short: its header counts {count} triangles, {there} are there")
     if len(corners) == 0 or len(corners) % 3:
         raise ValueError(f"it holds {len(corners)} corners of triangles")
     return corners, np.arange(len(corners)).reshape(-1, 3)

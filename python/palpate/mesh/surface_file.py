@@ -15,6 +15,7 @@ import numpy as np
 
 from palpate.errors import MeshError
 from palpate.input_file import require_file
+from palpate.mesh.cut_short import require_whole
 from palpate.mesh.ply import has_strips, read_ply
 from palpate.mesh.stl import load_stl, read_stl
 
@@ -51,7 +52,7 @@ def load_surface(surface: str | os.PathLike[str] | trimesh.Trimesh | SurfaceFile
     Raises
     ------
     MeshError
-        A file that is missing, cannot be read, or holds no triangles.
+        A file that is missing, cut short, cannot be read, or holds no triangles.
 
     """
     import trimesh
@@ -75,9 +76,10 @@ def load_surface(surface: str | os.PathLike[str] | trimesh.Trimesh | SurfaceFile
             reasons.append(" ".join(str(error).split())[:150] or type(error).__name__)
             continue
         if len(found.shape.faces) > 0:
+            require_whole(path, len(found.shape.faces))
             return found
     if reasons:
-        raise MeshError(f"{path}: cannot be read as a surface ({reasons[0]})")
+        raise MeshError(f"{path}: cannot be read as a surface ({reasons[-1]})")
     raise MeshError(f"{path}: holds no triangles; is it really a {path.suffix[1:].upper()} file?")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -199,11 +200,11 @@ class Adjustable:
             self._core.set(name, changed, number)
 
     def _tool(self, tool: int) -> int:
-        if not 0 <= tool < len(self.scene.tools):
-            raise SceneError(f"there is no tool {tool}: the scene has {len(self.scene.tools)}")
+        if not (isinstance(tool, Integral) and 0 <= tool < len(self.scene.tools)):
+            raise SceneError(f"there is no tool {tool!r}: the scene has {len(self.scene.tools)}")
         return tool
 
     def _body(self, body: int) -> int:
-        if not 0 <= body < len(self.bodies):
-            raise SceneError(f"there is no body {body}: the scene has {len(self.bodies)}")
+        if not (isinstance(body, Integral) and 0 <= body < len(self.bodies)):
+            raise SceneError(f"there is no body {body!r}: the scene has {len(self.bodies)}")
         return body

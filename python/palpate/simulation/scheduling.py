@@ -13,6 +13,7 @@ from palpate import _native
 from palpate.errors import SceneError, SchedulingWarning
 from palpate.scene import BuiltScene, Scene
 from palpate.scene.tables import DeviceTable
+from palpate.units import brief_repr
 
 
 def scheduled(scene: Scene | BuiltScene, cpus: Sequence[int] | None, priority: int | None) -> BuiltScene:
@@ -24,9 +25,11 @@ def scheduled(scene: Scene | BuiltScene, cpus: Sequence[int] | None, priority: i
     Raises
     ------
     SceneError
-        A priority out of range, or processors that this process may not run on.
+        What is no scene, a priority out of range, or processors that this process may not run on.
 
     """
+    if not isinstance(scene, (Scene, BuiltScene)):
+        raise SceneError(f"a simulation takes a palpate.Scene, got {brief_repr(scene)}: Scene.read reads a file")
     tables = scene.scene if isinstance(scene, BuiltScene) else scene
     device = with_scheduling(tables.device, cpus, priority)
     if device is tables.device:

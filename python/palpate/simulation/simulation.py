@@ -36,6 +36,7 @@ from palpate.simulation.scheduling import scheduled, start_loop
 from palpate.simulation.script import for_all_tools, grabs_of, orientations_of, positions_of, strike_of
 from palpate.simulation.series_growth import SeriesGrowth
 from palpate.simulation.thin import thin_places
+from palpate.simulation.warned import error_text, limit_text, refused_text
 from palpate.vectors import three_numbers
 
 # A tool is held at the limit of strain only where the pose has so much of it: one that has just landed is held until
@@ -305,28 +306,11 @@ class Simulation(Adjustable, SeriesGrowth, SceneEditing):
         frame = self._read_frame()
         if not self._warned and np.any(frame.limited) and frame.largest_strain >= AT_LIMIT * self.strain_limit:
             self._warned = True
-            warnings.warn(self._limit_text("a tool"), TouchWarning, stacklevel=2)
+            warnings.warn(limit_text("a tool", self.bodies, self.strain_limit), TouchWarning, stacklevel=2)
         if not self._warned_of_error and (frame.largest_error or 0.0) >= LARGE_ERROR:
             self._warned_of_error = True
-            warnings.warn(self._error_text(frame.largest_error or 0.0), TouchWarning, stacklevel=2)
+            warnings.warn(error_text(frame.largest_error or 0.0), TouchWarning, stacklevel=2)
         return frame
-
-    def _error_text(self, error: float) -> str:
-        return (
-            f"the force of a contact may be off by {100 * error:.2g} % (`error` of the contacts): press less deep, or "
-            "make the elements smaller"
-        )
-
-    def _limit_text(self, what: str) -> str:
-        if any(body.is_hyperelastic for body in self.bodies):
-            return (
-                f"{what} was held where the law of its material ends, so the force stays as it was at that depth: "
-                "press less deep"
-            )
-        return (
-            f"{what} was held at the strain limit of {100 * self.strain_limit:.0f} % (view.strain_limit): its "
-            f"force stays as it was at that depth; press less deep"
-        )
 
     def _read_frame(self) -> Frame:
         """Read the latest tick, without a word about the limit of strain."""
@@ -460,10 +444,10 @@ class Simulation(Adjustable, SeriesGrowth, SceneEditing):
         ticks = recording.limited.reshape(len(recording.limited), -1).any(axis=1)
         if ticks.any():
             what = f"in {ticks.sum()} of {len(ticks)} ticks, first in tick {ticks.argmax()}, a tool"
-            warnings.warn(self._limit_text(what), TouchWarning, stacklevel=3)
+            warnings.warn(limit_text(what, self.bodies, self.strain_limit), TouchWarning, stacklevel=3)
         error = float(recording.contacts["error"].max(initial=0.0)) if recording.source else 0.0
         if error >= LARGE_ERROR:
-            warnings.warn(self._error_text(error), TouchWarning, stacklevel=3)
+            warnings.warn(error_text(error), TouchWarning, stacklevel=3)
         return recording
 
     def _play(
@@ -489,6 +473,8 @@ class Simulation(Adjustable, SeriesGrowth, SceneEditing):
         raw = self._core.run(*everything, happens, about)
         if raw["fault"] is not None:
             raise SimulationError(raw["fault"])
+        if raw["refused"] is not None:
+            warnings.warn(refused_text(*raw["refused"]), TouchWarning, stacklevel=3)
         shape = (ticks, 3) if np.ndim(positions) == 2 else (ticks, given, 3)
         forces, torques = (
             raw[name].reshape(ticks, tools, 3)[:, :given].reshape(shape) for name in ("forces", "torques")

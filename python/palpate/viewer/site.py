@@ -12,7 +12,8 @@ from importlib import resources
 from pathlib import Path
 
 from palpate.atomic import folder_beside
-from palpate.errors import ViewerError
+from palpate.errors import SceneError, ViewerError
+from palpate.green.disk import STORED
 from palpate.scene import BuiltScene, Scene
 from palpate.viewer.gallery import PICTURES, Card, gallery_page
 from palpate.viewer.gallery_picture import gallery_picture
@@ -91,7 +92,16 @@ def write_site(scenes: Sequence[tuple[str, Scene | BuiltScene]], path: Path, gal
 
 
 def with_precision(scene: Scene, precision: str) -> Scene:
-    """Scene whose stores have numbers of another precision: ``f16`` is half as large to fetch as ``f32``."""
+    """Scene whose stores have numbers of another precision: ``f16`` is half as large to fetch as ``f32``.
+
+    Raises
+    ------
+    SceneError
+        A precision that does not exist.
+
+    """
+    if precision not in STORED:
+        raise SceneError(f"unknown precision '{precision}': use {', '.join(STORED)}")
     bodies = [body.model_copy(update={"precision": precision}) for body in scene.bodies]
     return scene.model_copy(update={"bodies": bodies})
 

@@ -44,6 +44,17 @@ def test_a_store_takes_the_place_of_a_store_damaged_or_not(box):
     assert (box / "a.palpate").read_bytes() == whole
 
 
+def test_a_segment_that_is_not_stiff_is_refused(box):
+    (box / "map.nrrd").write_text("")
+    found = run("mesh", "map.nrrd", "map.vtu", "--segment", "1=-4kPa", cwd=box)
+    refused(found, "--segment 1=-4kPa: a Young's modulus is positive")
+
+
+def test_a_map_is_for_the_page(box):
+    found = run("run", "box.vtu", "--headless", "1", "--map", "box.vtu", cwd=box)
+    assert found.returncode == 2 and "--map is shown in the page" in found.stderr and "Traceback" not in found.stderr
+
+
 @pytest.mark.parametrize(
     ("material", "region", "words"),
     [

@@ -40,6 +40,20 @@ def test_a_press_beyond_the_strain_limit_is_warned_of(block_green):
     assert shallow.largest_strain < 0.3
 
 
+@pytest.mark.parametrize(("gravity", "crushes"), [(-9.81, False), (-200.0, True)])
+def test_loads_beyond_the_strain_limit_are_warned_of(block, tmp_path, gravity, crushes):
+    """A column of length L under its own weight: the strain at its support is rho g L / E, 0.08 and 1.6 here."""
+    body = palpate.Body(
+        block.mesh, material=block.material, fixed=block.fixed_nodes, loads=palpate.Loads(gravity=(gravity, 0, 0))
+    )
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        for _ in ("computed", "read"):
+            palpate.precompute(body, path=tmp_path / "block.palpate", progress=False)
+    texts = [str(one.message) for one in caught if one.category is palpate.TouchWarning]
+    assert len(texts) == 2 * crushes and all("the body's own loads strain its surface by" in text for text in texts)
+
+
 def test_a_contact_radius_larger_than_the_body_is_refused(block_green):
     with pytest.raises(palpate.BodyError, match=r"contact radius of 5 m is larger than the body, which is 80 x 50"):
         block_green.touch(TOP, (None, None, -1e-3), 5.0)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import re
 import struct
 
 import numpy as np
 import pytest
 import trimesh
+from command_line import refused, run
 
 import palpate
 from palpate.mesh.surface_file import load_surface
@@ -110,3 +112,40 @@ def test_files_that_cannot_be_read_cost_one_line(tmp_path, name, content, capfd)
         load_surface(tmp_path / name)
     assert "\n" not in str(refusal.value)
     assert capfd.readouterr() == ("", "")
+
+
+SPHERE = {
+    "text.stl": trimesh.creation.icosphere(2).export(file_type="stl_ascii").encode(),
+    "binary.stl": trimesh.creation.icosphere(2).export(file_type="stl"),
+    "text.ply": trimesh.creation.icosphere(2).export(file_type="ply", encoding="ascii"),
+    "binary.ply": trimesh.creation.icosphere(2).export(file_type="ply"),
+    "text.off": trimesh.creation.icosphere(2).export(file_type="off").encode(),
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("text.stl", r"'endsolid' is missing after \d+ triangles"),
+        ("binary.stl", r"counts 320 triangles, \d+ are there"),
+        ("text.ply", r"counts 320 faces, \d+ are there"),
+        ("binary.ply", ""),
+        ("text.off", r"counts 320 faces, \d+ are there"),
+    ],
+)
+def test_files_cut_short_are_refused(tmp_path, name, words):
+    """Of a file that is taken as it is filling would close the hole, and nobody would see that something is missing."""
+    (tmp_path / name).write_bytes(SPHERE[name])
+    assert len(load_surface(tmp_path / name).shape.faces) == 320
+    kept = SPHERE[name][:-400]
+    if "text" in name:
+        kept = kept[: kept.rindex(b"facet normal" if name == "text.stl" else b"\n3 ")]
+    (tmp_path / name).write_bytes(kept)
+    with pytest.raises(palpate.MeshError, match=rf"{name}: [^\n]*cut short") as refusal:
+        load_surface(tmp_path / name)
+    assert re.search(words, str(refusal.value))
+
+
+def test_a_description_of_a_surface_needs_finite_coordinates(tmp_path):
+    (tmp_path / "a.off").write_text("OFF\n4 4 0\n0 0 0\nnan 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n")
+    refused(run("info", "a.off", "--unit", "mm", cwd=tmp_path), "a.off: vertex 1 has a coordinate that is not finite")

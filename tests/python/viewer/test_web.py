@@ -101,6 +101,11 @@ def test_forces_of_another_tool_are_the_native_ones_to_the_bit(site, tmp_path, s
     assert here.tobytes() == there.tobytes()
 
 
+def test_an_unknown_precision_is_refused():
+    with pytest.raises(palpate.SceneError, match=r"^unknown precision 'f7': use f16, f32, f64$"):
+        with_precision(model_scene("liver"), "f7")
+
+
 def test_program_and_liver_are_small(site):
     _, _, sizes = site
     assert sizes.program <= LARGEST_PROGRAM
