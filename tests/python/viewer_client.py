@@ -11,8 +11,9 @@ import numpy as np
 from websockets.asyncio.client import connect
 
 from palpate.viewer import messages
+from palpate.viewer.fields import ClientView
 from palpate.viewer.server import ViewerServer
-from palpate.viewer.session import ClientView, Session
+from palpate.viewer.session import Session
 
 # Frames come as fast as a busy machine lets them: a wait ends by what they hold, and fails only after this time, s.
 PATIENCE = 60.0

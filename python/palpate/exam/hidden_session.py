@@ -15,9 +15,9 @@ import numpy as np
 
 from palpate.scene import BuiltScene
 from palpate.simulation import Contact, Frame
-from palpate.viewer.fields import Picture
+from palpate.viewer.fields import ClientView, Picture
 from palpate.viewer.messages import numbered
-from palpate.viewer.session import ClientView, Session
+from palpate.viewer.session import Session
 
 # The only field, always zero.
 NOTHING = {

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import asyncio
 import base64
 import time
 from pathlib import Path
 from typing import Any
 
-from palpate.errors import Error, ViewerError
+from palpate.errors import ViewerError
 from palpate.exam.course import Course
 from palpate.exam.hidden_session import HiddenSession
 from palpate.exam.plot import plot_exam
@@ -17,6 +16,7 @@ from palpate.exam.result import Result
 from palpate.scene import BuiltScene
 from palpate.viewer.background import CancellableTask
 from palpate.viewer.server import Client, ViewerServer
+from palpate.viewer.status import error_message
 
 # The tone is as loud as it gets at so many times the force over plain tissue at the exam's depth.
 LOUDEST = 3.0
@@ -66,7 +66,7 @@ class ExamServer(ViewerServer):
     async def _send_greeting(self, client: Client) -> None:
         await super()._send_greeting(client)
         self._began = self._began or time.monotonic()
-        await client.send(self._exam_message())
+        client.send(self._exam_message())
 
     async def _command(self, message: dict[str, Any]) -> None:
         session = self._session
@@ -89,17 +89,17 @@ class ExamServer(ViewerServer):
         try:
             # A body that could not be shown was not asked about.
             if trial.number == self._shown:
-                touched = await self._worker.call(lambda: session.touched) if message["found"] else None
+                touched = await self.call(lambda: session.touched) if message["found"] else None
                 if message["found"] and touched is None:
                     raise ViewerError("touch the body first: a mark is where the tool touches it, or did last")
                 seconds = time.monotonic() - (self._began or time.monotonic())
                 answered = self._course.scored(touched, seconds)
-                await self._worker.call(self._write, answered)
+                await self.call(self._write, answered)
                 self._course.take(answered)
         except BaseException:
             self._building = None
             raise
-        self._build_task = asyncio.create_task(self._next_trial(building))
+        self.work(self._next_trial(building))
 
     def _write(self, answered: Any) -> None:
         try:
@@ -114,23 +114,24 @@ class ExamServer(ViewerServer):
         else:
             make = lambda: self._make_session(self._course.library.built(trial.nodule))  # noqa: E731
             await self.switch("Next trial", make, self._show_next, building)
-        await self.send_all(self._exam_message())
+        self.send_all(self._exam_message())
 
     def _show_next(self, session: Any) -> None:
-        self.exchange(session)
+        self.replace(session)
         trial = self._course.trial
         assert trial is not None
         self._shown, self._began = trial.number, time.monotonic()
 
     async def _conclude(self, building: CancellableTask) -> None:
         try:
-            await self._worker.call(self._session.release)
+            await self.with_session(lambda session: session.release())
             self.result = await building.run(lambda: finish(self._course, self._folder), lambda _: None)
             print("\n".join(self.result.lines()), flush=True)
-        except (Error, OSError) as error:
-            await self.send_all({"type": "error", "text": f"{error}; the answers are in {self._folder}"})
+        except Exception as error:
+            self.send_all(error_message(error))
+            self.send_all({"type": "error", "text": f"the answers are in {self._folder}"})
         finally:
-            self._building = None
+            self.finish_building()
 
     def _exam_message(self) -> dict[str, Any]:
         """Where the exam stands; nothing in it depends on what is hidden."""

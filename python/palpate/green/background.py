@@ -90,6 +90,14 @@ class BackgroundPrecompute:
         self._listener.start()
 
     def _listen(self, lines: Iterable[bytes]) -> None:
+        try:
+            self._take_messages(lines)
+        except Exception as error:
+            # Whoever waits must not wait for ever: a message cut short, a store that cannot be deleted.
+            self._finish(f"{type(error).__name__}: {error}")
+        self._finish("the process that computes the columns has ended")
+
+    def _take_messages(self, lines: Iterable[bytes]) -> None:
         for line in lines:
             message = json.loads(line)
             if "done" in message:
@@ -104,7 +112,6 @@ class BackgroundPrecompute:
                     self._accept(GreensFunction.load(self._job.target, body=self.body))
             else:
                 self._load(bool(message.get("finished")))
-        self._finish("the process that computes the columns has ended")
 
     def _note_progress(self, done: int, columns: int) -> None:
         with self._changed:
@@ -210,7 +217,7 @@ class BackgroundPrecompute:
         wanted = np.intersect1d(surface_region(self.body, np.asarray(nodes), "painted"), self._job.region)
         if self.is_complete or self.error is not None or not len(wanted):
             return
-        with contextlib.suppress(OSError):  # it has ended meanwhile
+        with contextlib.suppress(OSError, ValueError):  # it has ended or was closed meanwhile
             send_line(self._input, np.searchsorted(surface, wanted).tolist())
             with self._changed:
                 self._painted = np.union1d(self._painted, wanted)

@@ -112,6 +112,8 @@ class BackgroundSeries:
                     if number == len(self._jobs):
                         self._ended.set()
                         break
+        except Exception as error:
+            self.error = self.error or f"{type(error).__name__}: {error}"
         finally:
             self._ended.set()
 

@@ -230,7 +230,11 @@ class Simulation(Adjustable, SeriesGrowth, SceneEditing):
 
     def _begin_recording(self, path: Path) -> None:
         tools = len(self.scene.tools)
-        self._core.begin_recording(path, self._about((tools, tools == 1), clock=True) | self._hold_series())
+        try:
+            self._core.begin_recording(path, self._about((tools, tools == 1), clock=True) | self._hold_series())
+        except BaseException:
+            _native.hold_series(self._core, False)
+            raise
 
     def _about(self, shown: tuple[int, bool], clock: bool) -> dict[str, str]:
         return about(self.scene, self.bodies, _native.device_limits(self._core), shown, clock)

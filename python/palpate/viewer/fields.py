@@ -32,6 +32,15 @@ DECAY = 0.8
 
 
 @dataclass(frozen=True)
+class ClientView:
+    """What a page looks at: a field by name, the value at which its colours end, and whether it sees the inside."""
+
+    field: str = ""
+    full_scale: float | None = None
+    cutaway: bool = False
+
+
+@dataclass(frozen=True)
 class Field:
     """What the page may show: its name in messages, its title, its unit; a signed field is zero in the middle.
 

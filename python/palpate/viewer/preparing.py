@@ -15,6 +15,7 @@ from palpate.progress import Reporter
 from palpate.scene import BuiltScene
 from palpate.viewer.server import ViewerServer
 from palpate.viewer.setup_session import SetupSession, ShownSurface
+from palpate.viewer.status import error_message
 from palpate.viewer.surface_map import SurfaceMap
 
 
@@ -83,16 +84,16 @@ async def prepare(server: ViewerServer, preparation: Preparation) -> None:
         prepared = await building.run(lambda: preparation.build(reporter, draw), _close)
         for future in drawn:
             await asyncio.wrap_future(future)
-        session = await server.call(server.first_session, prepared.built, prepared.maps)
-        await server.call(server.exchange, session)
-        server.follow(prepared.growing)
-        await server.send_all(await server.call(session.settings))
+        session = await server.call(server.first_session, prepared.built, prepared.maps, prepared.growing)
+        await server.call(server.replace, session)
+        await server.send_settings()
         await server.send_setup()
     except Error as error:
-        await server.send_all({"type": "error", "text": str(error)})
+        server.send_all(error_message(error))
         raise
     finally:
-        await server.finish_building()
+        building.cancel()
+        server.finish_building()
 
 
 def _close(prepared: Prepared) -> None:

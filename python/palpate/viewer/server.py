@@ -9,7 +9,7 @@ import gc
 import secrets
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
@@ -19,19 +19,18 @@ from websockets.asyncio.server import Server, ServerConnection, serve
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
-from palpate.errors import Error, SimulationError, ViewerError
+from palpate.errors import Error, ViewerError
 from palpate.green import BackgroundPrecompute
 from palpate.scene import BuiltScene, Scene
 from palpate.viewer import messages
 from palpate.viewer.addresses import reachable
-from palpate.viewer.background import CancellableTask, Worker
 from palpate.viewer.client import Client
-from palpate.viewer.computing import Computing
 from palpate.viewer.pages import load_pages, respond
 from palpate.viewer.session import Session, choices
+from palpate.viewer.session_host import SessionHost
 from palpate.viewer.setting_up import SettingUp
 from palpate.viewer.setup_session import SetupSession
-from palpate.viewer.status import StatusReporter, status
+from palpate.viewer.status import LOG, error_message
 from palpate.viewer.surface_map import SurfaceMap
 from palpate.viewer.upload import MAX_PART
 
@@ -44,17 +43,21 @@ MAX_CLIENTS = 16
 HELLO_TIMEOUT = 5.0
 # A controller that says nothing for this long, not even that it drew a frame, is lost: its contact is released, s.
 LOST_AFTER = 2.0
-# Between two looks at a loop that does not run, s.
-STOPPED_PAUSE = 0.25
+# Between two looks at a session whose frames fail, and at what nobody asks for: a lost page, columns that are ready, s.
+STOPPED_PAUSE = LOOK_PAUSE = 0.25
+# How long the server waits for connections to close before it ends them, s.
+CLOSE_PATIENCE = 3.0
 # Between two looks whether a body that is set up has been drawn anew, s.
 SET_UP_PAUSE = 0.05
+# A page that answers no ping for this long is gone, s. It reads messages one at a time: the next ones wait, pings too.
+PING_PATIENCE = 30
 BAD_TOKEN = 4401
 # So often threads pass on the interpreter's lock while the server runs, s; Python's own 5 ms add up to a visible halt
 # where the event loop takes the lock several times for one message.
 SWITCH_INTERVAL = 1e-3
 
 
-class ViewerServer:
+class ViewerServer(SessionHost):
     """Serves one session.
 
     Parameters
@@ -101,18 +104,11 @@ class ViewerServer:
         self._pages = load_pages()
         self._maps, self._recordings = maps, recordings
         self._record = record
-        self._session: Session | SetupSession = (
-            built if isinstance(built, SetupSession) else SetupSession() if built is None else self.first_session(built)
-        )
-        self._computing = Computing(growing)
-        self._computing.begin()
-        self._session.start()
-        self._worker = Worker()
+        if built is None:
+            built = SetupSession()
+        super().__init__(built if isinstance(built, SetupSession) else self.first_session(built, growing=growing))
         self._setting_up = SettingUp(self, recordings)
         self._models, self._scene_of = list(models), scene_of
-        self._clients: list[Client] = []
-        self._controller: Client | None = None
-        self._building: CancellableTask | None = None
         self._server: Server | None = None
 
     @property
@@ -126,10 +122,16 @@ class ViewerServer:
         names = [f"[{host}]" if ":" in host else host for host in reachable(self.host)]
         return [f"http://{name}:{self.port}/#token={self.token}" for name in names]
 
-    def first_session(self, built: BuiltScene | Session, maps: Sequence[SurfaceMap | None] | None = None) -> Session:
+    def first_session(
+        self,
+        built: BuiltScene | Session,
+        maps: Sequence[SurfaceMap | None] | None = None,
+        growing: Mapping[int, BackgroundPrecompute] | None = None,
+    ) -> Session:
         """Session of what is touched first, recorded if that was asked for."""
         self._maps = maps or self._maps
         session = built if isinstance(built, Session) else self._make_session(built)
+        session.growing = growing or {}
         if self._record is not None:
             session.simulation.record(self._record)
         return session
@@ -156,7 +158,7 @@ class ViewerServer:
                 max_size=MAX_PART,
                 compression=None,
                 ping_interval=5,
-                ping_timeout=10,
+                ping_timeout=PING_PATIENCE,
                 close_timeout=1,
                 server_header=None,
             )
@@ -173,8 +175,9 @@ class ViewerServer:
         # Modules are not garbage: a full collection that looks through them all halts everything for 30 ms.
         gc.collect()
         gc.freeze()
+        self._loop = asyncio.get_running_loop()
         # Two tasks: what fails in a message must not end the one that lets go of the body.
-        self._watches = [asyncio.create_task(self._watchdog()), asyncio.create_task(self._watch_computed())]
+        self._watches = [asyncio.create_task(self._watch(look)) for look in (self._watchdog, self._send_computed)]
 
     async def stop(self) -> dict[str, Any] | None:
         """Close all connections and stop the loop: the report on the recording that this ends, if it ends one."""
@@ -184,10 +187,18 @@ class ViewerServer:
             for watch in self._watches:
                 watch.cancel()
             self._server.close()
-            await self._server.wait_closed()
-        if self._building is not None:
-            self._building.cancel()
+            await self.end_work()
+            await self._close_connections(self._server)
         return self._close_session()
+
+    async def _close_connections(self, server: Server) -> None:
+        """Wait until all are closed; those of pages that do not answer are ended."""
+        try:
+            await asyncio.wait_for(server.wait_closed(), CLOSE_PATIENCE)
+        except asyncio.TimeoutError:
+            for client in self._clients:
+                client.abort()
+            await server.wait_closed()
 
     def _close_session(self) -> dict[str, Any] | None:
         self._worker.close()
@@ -205,31 +216,32 @@ class ViewerServer:
             return
         client = Client(connection)
         self._clients.append(client)
-        sender = None
+        tasks = [asyncio.create_task(client.write())]
         try:
             if self._controller is None and self._session.controllable:
                 self._controller = client
             await self._send_greeting(client)
             client.may_send.set()
-            sender = asyncio.create_task(self._send_frames(client))
+            tasks.append(asyncio.create_task(self._send_frames(client)))
             async for text in connection:
                 await self._message(client, text)
         except ConnectionClosed:
             pass
         finally:
-            if sender is not None:
-                sender.cancel()
+            for task in tasks:
+                task.cancel()
             self._clients.remove(client)
             await self._release_control(client)
 
     async def _send_greeting(self, client: Client) -> None:
         """Tell a page what it needs to know before its first scene."""
         role = "control" if self._controller is client else "watch"
-        models = choices(self._models)
-        await client.send({"type": "welcome", "role": role, "version": VERSION, "models": models})
-        await client.send(await self._worker.call(self._computing.message, self._session))
+        client.send({"type": "welcome", "role": role, "version": VERSION, "models": choices(self._models)})
+        client.send(await self.call(self.computed))
         if self._setting_up.is_offered:
-            await client.send(await self._worker.call(self._setting_up.message))
+            client.send(await self.call(self._setting_up.message))
+        if self._status is not None:
+            client.send(self._status)
 
     async def _authenticate(self, connection: ServerConnection) -> bool:
         """Whether the first message carries the token."""
@@ -274,8 +286,8 @@ class ViewerServer:
                 if message["type"] not in self._session.from_all:
                     self._require_control(client)
                 await self._command(message)
-        except Error as error:
-            await client.send({"type": "error", "text": str(error)})
+        except Exception as error:
+            client.send(error_message(error))
 
     def _require_control(self, client: Client) -> None:
         if client is not self._controller:
@@ -284,8 +296,7 @@ class ViewerServer:
     async def _command(self, message: dict[str, Any]) -> None:
         """Do what the controlling client says."""
         if message["type"] == "cancel":
-            if self._building is not None:
-                self._building.cancel()
+            self.cancel()
         elif message["type"] == "model":
             await self._choose(message.get("name"))
         elif message["type"] == "shape":
@@ -293,14 +304,21 @@ class ViewerServer:
         elif message["type"] in self._setting_up.kinds:
             await self._setting_up.command(message)
         elif message["type"] == "paint":
-            await self._worker.call(self._computing.paint, self._session, message)
+            await self.with_session(lambda session: self._computing.paint(session, message))
             await self._send_computed()
         elif message["type"] == "record":
-            await self.send_all(await self._worker.call(self._session.record, message))
+            self.send_all(await self.with_session(lambda session: session.record(message)))
         else:
-            session = self._session
-            if await self._worker.call(session.handle, message):
-                await self.send_all(await self._worker.call(session.settings))
+            await self._handle(message)
+
+    async def _handle(self, message: dict[str, Any]) -> None:
+        """Let the session do what a message asks for, and send what that has set."""
+        changed = message["type"] == "set"  # some of it, where the rest is refused
+        try:
+            changed = await self.with_session(lambda session: session.handle(message))
+        finally:
+            if changed:
+                await self.send_settings()
 
     async def _send_frames(self, client: Client) -> None:
         """Send the latest frame whenever the client has drawn the one before; nothing is ever queued."""
@@ -309,31 +327,33 @@ class ViewerServer:
                 await client.may_send.wait()
                 client.may_send.clear()
                 session = self._session
-                if client.shown is not session:
-                    client.shown, client.log_seen = session, (0, 0)
-                    await client.connection.send(await self._worker.call(session.scene_message))
-                    client.may_send.set()
-                    continue
-                if not isinstance(session, Session):
-                    await asyncio.sleep(SET_UP_PAUSE)
-                    client.may_send.set()
-                    continue
-                client.sent += 1
                 try:
-                    message, client.log_seen = await self._worker.call(
-                        session.frame_message, client.sent, client.log_seen, client.wants
-                    )
-                except SimulationError as error:
-                    # Another model may have taken the place of this one meanwhile.
+                    await self._send_next(client, session)
+                except Exception as error:
+                    # Another session may have taken the place of this one meanwhile.
                     if session is self._session:
                         if client.refused is not session:
                             client.refused = session
-                            await client.send({"type": "error", "text": str(error)})
+                            client.send(error_message(error))
                         await asyncio.sleep(STOPPED_PAUSE)
                     client.may_send.set()
-                    continue
-                await client.connection.send(message)
-                await asyncio.sleep(1.0 / FRAME_RATE)
+
+    async def _send_next(self, client: Client, session: Session | SetupSession) -> None:
+        """Send the scene of a session, or a frame of it."""
+        if client.shown is not session:
+            scene = await self.call(session.scene_message)
+            client.shown, client.log_seen = session, (0, 0)
+            await client.send_now(scene)
+            client.may_send.set()
+        elif isinstance(session, Session):
+            client.sent += 1
+            view = (client.sent, client.log_seen, client.wants)
+            message, client.log_seen = await self.call(session.frame_message, *view)
+            await client.send_now(message)
+            await asyncio.sleep(1.0 / FRAME_RATE)
+        else:
+            await asyncio.sleep(SET_UP_PAUSE)
+            client.may_send.set()
 
     async def _release_control(self, client: Client) -> None:
         """Let go of the body; who has watched longest takes over."""
@@ -341,56 +361,34 @@ class ViewerServer:
             return
         self._controller = self._clients[0] if self._clients else None
         self._setting_up.drop_upload()
-        await self._worker.call(self._session.release)
-        if self._controller is not None:
-            await self._controller.send({"type": "role", "role": "control"})
+        await self.with_session(lambda session: session.release())
+        self.send_control({"type": "role", "role": "control"})
+
+    async def _watch(self, look: Callable[[], Awaitable[None]]) -> None:
+        """Look again and again. What goes wrong is logged once, and looked at again: nobody awaits a watch."""
+        reported = ""
+        while True:
+            await asyncio.sleep(LOOK_PAUSE)
+            try:
+                await look()
+            except Exception as error:
+                if repr(error) != reported:
+                    LOG.error("a mistake within palpate", exc_info=error)
+                reported = repr(error)
 
     async def _watchdog(self) -> None:
-        while True:
-            await asyncio.sleep(0.25)
-            controller = self._controller
-            if controller is None or time.monotonic() - controller.last_message > LOST_AFTER:
-                await self._worker.call(self._session.release)
-            await self.send_all(await self._worker.call(self._session.recorder.stop_after_failure))
-
-    async def _watch_computed(self) -> None:
-        while True:
-            await asyncio.sleep(0.25)
-            await self._send_computed()
+        controller = self._controller
+        if controller is None or time.monotonic() - controller.last_message > LOST_AFTER:
+            await self.with_session(lambda session: session.release())
+        self.send_all(await self.with_session(lambda session: session.recorder.stop_after_failure()))
 
     async def _send_computed(self) -> None:
         """Give the loop what has become ready, and tell of it."""
         try:
-            message = await self._worker.call(self._computing.step, self._session)
+            message = await self.call(self.take_computed)
         except Error as error:
-            message = {"type": "error", "text": str(error)}
-        await self.send_all(message)
-
-    async def send_all(self, message: dict[str, Any] | None, but_control: bool = False) -> None:
-        """Send a message to all pages, or to those that watch; None is no message."""
-        if message is not None:
-            for client in [c for c in self._clients if not (but_control and c is self._controller)]:
-                await client.send(message)
-
-    async def send_control(self, message: dict[str, Any]) -> None:
-        """Send a message to the page in control."""
-        if self._controller is not None:
-            await self._controller.send(message)
-
-    @property
-    def session(self) -> Session | SetupSession:
-        """What is shown."""
-        return self._session
-
-    async def call(self, work: Callable[..., Any], *arguments: Any) -> Any:
-        """Do ``work(*arguments)`` on the thread of the session."""
-        return await self._worker.call(work, *arguments)
-
-    def follow(self, growing: Mapping[int, BackgroundPrecompute] | None) -> None:
-        """Take what is computed beside the loop of another scene, in place of what was."""
-        self._computing.close()
-        self._computing = Computing(growing)
-        self._computing.begin()
+            message = error_message(error)
+        self.send_all(message)
 
     async def _choose(self, name: Any) -> None:
         """Switch to another model; the one shown goes on until the new one is ready."""
@@ -400,99 +398,34 @@ class ViewerServer:
         solving = self.reporter(f"Solving the {name}", building)
         modes = self.reporter(f"Computing the modes of the {name}", building)
         make = lambda: Session(scene.build(solving, modes), folder=self._recordings)  # noqa: E731
-        self._build_task = asyncio.create_task(self.switch(f"Loading the {name}", make, self.exchange, building))
+        self.work(self.switch(f"Loading the {name}", make, self.replace, building))
 
     async def _reshape(self, message: dict[str, Any]) -> None:
         """Give a tool another shape: another loop on the same bodies, while the one before goes on."""
+        self.require_idle()
         before = self._session
-        built = await self._worker.call(before.reshaped, message)
+        built = await self.call(before.reshaped, message)
         if built is None:
             return
         make = lambda: Session(built, before.own_tools, before.maps, self._recordings)  # noqa: E731
         building = self.begin_building()
         text = "Preparing the tool: a press that is held continues with it"
-        self._build_task = asyncio.create_task(self.switch(text, make, self._keep_settings, building))
+        self.work(self.switch(text, make, self._exchange_tool, building))
 
-    def begin_building(self) -> CancellableTask:
-        """Begin something long: one at a time.
-
-        Raises
-        ------
-        ViewerError
-            Another is not done.
-
-        """
-        if self._building is not None:
-            raise ViewerError("wait until what is being prepared is ready, or cancel it")
-        self._building = CancellableTask()
-        return self._building
-
-    @property
-    def is_building(self) -> bool:
-        """Whether something long is under way."""
-        return self._building is not None
-
-    async def finish_building(self) -> None:
-        """Let another long work begin, and tell pages that this one has ended."""
-        self._building = None
-        await self.send_all(status(""))
+    def _exchange_tool(self, session: Session) -> None:
+        """Exchange sessions on the same bodies: settings, stores and presses go on."""
+        before = self._session
+        assert isinstance(before, Session)
+        pressed = before.pressed()
+        session.copy_settings(before)
+        self.exchange(session)
+        self._setting_up.note_exchange(before, session)
+        session.take_stores_of(before)
+        session.press_on(pressed)
 
     async def send_setup(self) -> None:
         """Tell pages whether files may be brought, and what is set up."""
-        await self.send_all(await self._worker.call(self._setting_up.message))
-
-    def end_building(self) -> None:
-        """Let another long work begin."""
-        self._building = None
-
-    async def switch(
-        self, text: str, make: Callable[[], Session], exchange: Callable[[Session], None], building: CancellableTask
-    ) -> None:
-        """Make a session beside the one that runs, and put it in its place."""
-        try:
-            await self.send_all(status(text))
-            await self._worker.call(self._session.release)
-            session = await building.run(make, Session.close)
-            # Two loops at real-time priority would keep each other from their deadlines: the old one ends first.
-            why = "a recording is of one scene, and this one has another now"
-            await self.send_all(await self._worker.call(self._session.recorder.stop, why))
-            await self._worker.call(exchange, session)
-            await self.send_all(await self._worker.call(session.settings))
-        except Exception as error:
-            # None of any kind may leave the pages without a word.
-            why = str(error) if isinstance(error, Error) else f"a mistake within palpate, please report it: {error!r}"
-            await self.send_all({"type": "error", "text": why})
-            await self.send_all(await self._worker.call(self._session.settings))
-        finally:
-            self._building = None
-            await self.send_all(status(""))
-
-    def exchange(self, session: Session) -> None:
-        """Put a session in the place of the one that runs, which goes on where the other does not start."""
-        before = self._session
-        before.close()
-        try:
-            session.start()
-        except BaseException as error:
-            session.close()
-            before.resume()
-            # Its tools may be moved otherwise now: pages get the scene anew.
-            for client in self._clients:
-                client.shown = None
-            if isinstance(error, Error):
-                raise type(error)(f"{error}; the scene shown before stays") from error
-            raise
-        self._session = session
-
-    def _keep_settings(self, session: Session) -> None:
-        before = self._session
-        session.copy_settings(before)
-        self.exchange(session)
-        session.press_on(before)
-
-    def reporter(self, text: str, work: CancellableTask) -> StatusReporter:
-        """Send all pages how far a long work is."""
-        return StatusReporter(text, work, self.send_all)
+        self.send_all(await self.call(self._setting_up.message))
 
 
 def _bytes(token: str) -> bytes:

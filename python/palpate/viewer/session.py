@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,11 +14,11 @@ import numpy as np
 
 from palpate._native import TOOL_SETTINGS
 from palpate.errors import DeviceError, Error, ViewerError
-from palpate.green import GreensFunction
+from palpate.green import BackgroundPrecompute, GreensFunction
 from palpate.scene import BuiltScene
 from palpate.scene.tables import ToolTable
 from palpate.simulation import Contact, Frame, Simulation
-from palpate.viewer.fields import Fields
+from palpate.viewer.fields import ClientView, Fields
 from palpate.viewer.log_rows import RecentRows, downsampled
 from palpate.viewer.messages import encode, index, number, numbered, quaternion, vector, word
 from palpate.viewer.motion import HISTORY_COLUMNS, MovingBody, history
@@ -33,15 +33,6 @@ LARGEST_RADIUS = 0.12
 REACH = 10.0
 # A frame younger than this serves all clients, s.
 FRAME_AGE = 0.008
-
-
-@dataclass(frozen=True)
-class ClientView:
-    """What a client looks at: a field by name, the value at which its colours end, and whether it sees the inside."""
-
-    field: str = ""
-    full_scale: float | None = None
-    cutaway: bool = False
 
 
 class Session:
@@ -83,12 +74,16 @@ class Session:
         self.simulation = Simulation(built) if simulation is None else simulation
         self.recorder = SessionRecorder(self.simulation, folder)
         self.maps = maps_per_body(maps, len(built.bodies))
+        # What is computed of the bodies beside the loop, by their rank, once this session is shown.
+        self.growing: Mapping[int, BackgroundPrecompute] = {}
+        # Files of shapes may be gone when another page opens.
+        self._outlines = [outline(tool, scene.folder) for tool in scene.tools]
         self._bodies = [self._shown(body) for body in range(len(built.bodies))]
         placed = np.vstack([body.points_to_scene(body.green.surface_positions) for body in built.bodies])
         low, high = placed.min(axis=0), placed.max(axis=0)
         self._centre, self.size = 0.5 * (low + high), float((high - low).max())
         self._active = [False] * len(scene.tools)
-        # The press under way of each tool, for a session that takes the place of this one.
+        # The press under way of each tool.
         self._pressed: dict[int, Mapping[str, Any]] = {}
         largest = self.simulation.largest_contact_radius(LARGEST_RADIUS * self.size)
         self._max_radii = [max(largest, tool.contact_radius) for tool in scene.tools]
@@ -227,9 +222,19 @@ class Session:
         if self._moving is not None and other._moving is not None:
             self._moving.set_time_scale(other._moving.time_scale)
 
-    def press_on(self, other: Session) -> None:
+    def take_stores_of(self, other: Session) -> None:
+        """Go on with the stores of another session on the same bodies: they may have grown since this one was made."""
+        for body, (own, grown) in enumerate(zip(self.built.bodies, other.built.bodies, strict=True)):
+            if grown.green is not own.green:
+                self.take_store(body, grown.green, grown.is_growing)
+
+    def pressed(self) -> list[Mapping[str, Any]]:
+        """Presses under way, for a session that takes the place of this one."""
+        return list(self._pressed.values())
+
+    def press_on(self, pressed: Iterable[Mapping[str, Any]]) -> None:
         """Go on with the presses of another session on the same bodies, as they were last."""
-        for message in other._pressed.values():
+        for message in pressed:
             # A tool that a device moves now is not for the pointer any more.
             with contextlib.suppress(Error):
                 self._press(message)
@@ -241,12 +246,10 @@ class Session:
 
     def scene_message(self) -> bytes:
         """Geometry and numbers of the scene."""
-        scene = self.built.scene
-        outlines = [outline(tool, scene.folder) for tool in scene.tools]
-        tools = [{**outline, **self._tool_entry(tool)} for tool, (outline, _) in enumerate(outlines)]
+        tools = [{**outline, **self._tool_entry(tool)} for tool, (outline, _) in enumerate(self._outlines)]
         header = {"type": "scene", "tools": tools, **self._scene_header()}
         bodies = numbered([body.arrays() for body in self._bodies])
-        return encode(header, {**bodies, **numbered([arrays for _, arrays in outlines], "tools/")})
+        return encode(header, {**bodies, **numbered([arrays for _, arrays in self._outlines], "tools/")})
 
     def _scene_header(self) -> dict[str, Any]:
         """Header of the scene message but for the tools."""

@@ -10,11 +10,10 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from palpate.body.tissues import TISSUES, Tissue
 from palpate.errors import Error, ViewerError
-from palpate.green import BackgroundPrecompute
 from palpate.mesh import TetMesh
 from palpate.mesh.fill_process import FillProcess, ReadFile
 from palpate.scene import Scene
@@ -25,33 +24,14 @@ from palpate.viewer.background import CancellableTask
 from palpate.viewer.computing import mask_of
 from palpate.viewer.messages import whole
 from palpate.viewer.session import Session
+from palpate.viewer.session_host import SessionHost
 from palpate.viewer.setup_body import SetupBody
 from palpate.viewer.setup_session import SetupSession
-from palpate.viewer.status import StatusReporter, status
+from palpate.viewer.status import error_message, status
 from palpate.viewer.upload import ENDINGS, MAX_FILE, MAX_PART, Upload
 
 # Where a mistake stands in a scene file: path, line, and table.
 _PLACE = re.compile(r"^\S.*?\.toml(:\d+)?: (\w+: )?")
-
-
-class Host(Protocol):
-    """What this needs of the server."""
-
-    @property
-    def session(self) -> Session | SetupSession: ...  # noqa: D102
-    @property
-    def is_building(self) -> bool: ...  # noqa: D102
-    def begin_building(self) -> CancellableTask: ...  # noqa: D102
-    def end_building(self) -> None: ...  # noqa: D102
-    def exchange(self, session: Any) -> None: ...  # noqa: D102
-    def follow(self, growing: Mapping[int, BackgroundPrecompute] | None) -> None: ...  # noqa: D102
-    def reporter(self, text: str, work: CancellableTask) -> StatusReporter: ...  # noqa: D102
-    async def call(self, work: Callable[..., Any], *arguments: Any) -> Any: ...  # noqa: D102
-    async def send_all(self, message: dict[str, Any], but_control: bool = False) -> None: ...  # noqa: D102
-    async def send_control(self, message: dict[str, Any]) -> None: ...  # noqa: D102
-    async def switch(  # noqa: D102
-        self, text: str, make: Callable[[], Any], exchange: Callable[[Any], None], building: CancellableTask
-    ) -> None: ...
 
 
 class SettingUp:
@@ -66,7 +46,7 @@ class SettingUp:
 
     """
 
-    def __init__(self, server: Host, folder: Path):
+    def __init__(self, server: SessionHost, folder: Path):
         self._server, self._folder = server, folder
         self._temporary: Path | None = None
         self._count = 0
@@ -74,8 +54,6 @@ class SettingUp:
         self._body: SetupBody | None = None
         # The session in which the body is touched.
         self._touched: Session | None = None
-        # What is computed of it beside its loop.
-        self._growing: Mapping[int, BackgroundPrecompute] = {}
         self._commands = {
             "upload": self._begin_upload,
             "setup": self._choose,
@@ -103,9 +81,9 @@ class SettingUp:
             raise ViewerError("no body can be set up here")
         try:
             await self._commands[message["type"]](message)
-        except Error:
+        except Exception:
             # The page has shown its choice already.
-            await self._server.send_control(self.message())
+            self._server.send_control(self.message())
             raise
 
     @property
@@ -140,19 +118,28 @@ class SettingUp:
         """Give up a file on its way: the page that sends it is gone."""
         if self._upload is not None:
             self._upload.close()
+            shutil.rmtree(self._upload.folder, ignore_errors=True)
             self._upload = None
+
+    def note_exchange(self, before: Session, session: Session) -> None:
+        """Take a session on the same bodies for the one before."""
+        if self._touched is before:
+            self._touched = session
 
     # Files.
 
     async def _begin_upload(self, message: Mapping[str, Any]) -> None:
         self.drop_upload()
-        if self._temporary is None:
-            self._temporary = Path(tempfile.mkdtemp(prefix="palpate-page-"))
-        self._count += 1
-        folder = self._temporary / str(self._count)
-        folder.mkdir()
-        self._upload = Upload(message, folder)
-        await self._server.send_control({"type": "uploaded", "bytes": 0})
+        try:
+            if self._temporary is None:
+                self._temporary = Path(tempfile.mkdtemp(prefix="palpate-page-"))
+            self._count += 1
+            folder = self._temporary / str(self._count)
+            folder.mkdir()
+            self._upload = Upload(message, folder)
+        except OSError as error:
+            raise ViewerError(f"upload: the file cannot be kept: {error.strerror or error}") from None
+        self._server.send_control({"type": "uploaded", "bytes": 0})
 
     async def take_part(self, part: bytes) -> None:
         """Take the next part of a file.
@@ -169,13 +156,13 @@ class SettingUp:
         try:
             await self._server.call(upload.take, part)
         except ViewerError:
-            self._upload = None
+            self.drop_upload()
             raise
         if upload.is_complete:
             self._upload = None
             building = self._server.begin_building()
-            self._task = asyncio.create_task(self._fill(upload.folder, upload.file, building))
-        await self._server.send_control({"type": "uploaded", "bytes": upload.received})
+            self._server.work(self._fill(upload.folder, upload.file, building))
+        self._server.send_control({"type": "uploaded", "bytes": upload.received})
 
     async def _fill(self, folder: Path, file: str, building: CancellableTask) -> None:
         """Read and fill a file; what was shown before comes back where that fails."""
@@ -193,25 +180,25 @@ class SettingUp:
 
         process = FillProcess(folder, file, None, on_read, on_stage)
         try:
-            await server.send_all(status(f"{file}: reading"))
+            server.send_all(status(f"{file}: reading"))
             mesh: TetMesh = await building.run(lambda: process.mesh(building.require_wanted), lambda _: None)
             for shown in drawn:
                 await asyncio.wrap_future(shown)
             assert self._body is not None
             self._body.take_mesh(mesh, process.notes)
-            await server.call(server.exchange, SetupSession(self._body))
-            server.follow(None)
+            await server.call(server.replace, SetupSession(self._body))
         except Exception as error:
+            server.send_all(error_message(error))
+            # What is still to be drawn would take the place of what comes back.
+            building.cancel()
+            await asyncio.gather(*map(asyncio.wrap_future, drawn), return_exceptions=True)
             self._body = body_before
             if server.session is not before:
-                await server.call(server.exchange, before)
-            why = str(error) if isinstance(error, Error) else f"a mistake within palpate, please report it: {error!r}"
-            await server.send_all({"type": "error", "text": why})
+                await server.call(server.restore, before)
             shutil.rmtree(folder, ignore_errors=True)
         finally:
-            server.end_building()
-            await server.send_all(status(""))
-            await server.send_all(self.message())
+            server.finish_building()
+            server.send_all(self.message())
 
     async def _show(self, body: SetupBody, building: CancellableTask) -> None:
         """Draw a surface before it is filled."""
@@ -220,7 +207,7 @@ class SettingUp:
         self._body = body
         if body.read.vertices is not None:
             await self._server.call(self._server.exchange, SetupSession(body))
-            await self._server.send_all(self.message())
+            self._server.send_all(self.message())
 
     # Choices.
 
@@ -228,19 +215,18 @@ class SettingUp:
         body = self._edited()
         if await self._server.call(body.change, message):
             await self._server.call(self._server.exchange, SetupSession(body))
-            await self._server.send_control(self.message())
-        await self._server.send_all(self.message(), but_control=True)
+            self._server.send_control(self.message())
+        self._server.send_all(self.message(), but_control=True)
 
     async def _paint(self, message: Mapping[str, Any]) -> None:
         body = self._edited()
         first = whole(message, "first", 0, max(0, len(body.mesh.surface_nodes) - 1) if body.mesh is not None else 0)
         await self._server.call(body.paint, first, mask_of(message, "nodes"))
-        await self._server.send_all(self.message(), but_control=True)
+        self._server.send_all(self.message(), but_control=True)
 
     def _edited(self) -> SetupBody:
         """Body that is set up now."""
-        if self._server.is_building:
-            raise ViewerError("wait until what is being prepared is ready, or cancel it")
+        self._server.require_idle()
         if self._body is None or not isinstance(self._server.session, SetupSession):
             raise ViewerError("there is no body to be set up: drop a file on the page")
         return self._body
@@ -256,36 +242,31 @@ class SettingUp:
         def make() -> Session:
             try:
                 built, growing = _with_first(scene).build_first(columns)
-                self._growing = growing
-                return Session(built, folder=self._folder)
+                session = Session(built, folder=self._folder)
+                session.growing = growing
+                return session
             except Error as error:
                 # The line of a file that nobody has written is of no use.
                 raise type(error)(_PLACE.sub("", str(error))) from None
 
-        text = f"{body.name}: assembling"
-        self._task = asyncio.create_task(self._switch_and_tell(text, make, building))
+        server.work(self._switch_and_tell(f"{body.name}: assembling", make, building))
 
     async def _switch_and_tell(self, text: str, make: Callable[[], Session], building: CancellableTask) -> None:
         def exchange(session: Session) -> None:
-            self._server.exchange(session)
+            self._server.replace(session)
             self._touched = session
 
-        self._growing = {}
         await self._server.switch(text, make, exchange, building)
-        if self._server.session is self._touched and self._touched is not None:
-            self._server.follow(self._growing)
-        else:
-            _end(self._growing)
-        await self._server.send_all(self.message())
+        self._server.send_all(self.message())
 
     async def _edit(self, _message: Mapping[str, Any]) -> None:
+        self._server.require_idle()
         body = self._body
         if body is None or self._server.session is not self._touched:
             raise ViewerError("what is shown was not set up in the page")
         await self._server.call(self._take_settings)
-        await self._server.call(self._server.exchange, SetupSession(body))
-        self._server.follow(None)
-        await self._server.send_all(self.message())
+        await self._server.call(self._server.replace, SetupSession(body))
+        self._server.send_all(self.message())
 
     async def _save(self, _message: Mapping[str, Any]) -> None:
         body, server = self._body, self._server
@@ -293,7 +274,7 @@ class SettingUp:
             raise ViewerError("what is shown was not set up in the page")
         await server.call(self._take_settings)
         await server.call(body.save, self._folder)
-        await server.send_all(self.message())
+        server.send_all(self.message())
 
     def _take_settings(self) -> None:
         """Keep what sliders have changed while the body is touched."""
@@ -317,8 +298,3 @@ def _with_first(scene: Scene) -> Scene:
     center, radius = first
     table = TouchTable.model_validate({"first": {"shape": "sphere", "center": center, "radius": radius}})
     return scene.model_copy(update={"touch": table})
-
-
-def _end(growing: Mapping[int, BackgroundPrecompute]) -> None:
-    for background in growing.values():
-        background.close()

@@ -144,6 +144,7 @@ def _segments(message: Mapping[str, Any], before: Sequence[SegmentChoice]) -> tu
     if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
         raise ViewerError("setup: segments must be a list of objects")
     names = [tissue.name for tissue in TISSUES]
+    tables = [{**table, "type": "setup: segments"} for table in tables]
     chosen = [SegmentChoice(word(table, "name"), _one_of(table, "tissue", names)) for table in tables]
     if [segment.name for segment in chosen] != [segment.name for segment in before]:
         raise ViewerError("setup: segments must be those of the file, in its order")

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import ViewerError
+from palpate.green import BackgroundPrecompute
 from palpate.mesh import TetMesh
 from palpate.viewer.drawn_surface import drawn_triangles
 from palpate.viewer.messages import encode, numbered
@@ -35,6 +36,7 @@ class SetupSession:
     takes_files = True
     runs = False
     from_all: frozenset[str] = frozenset()
+    growing: Mapping[int, BackgroundPrecompute] = {}
 
     def __init__(self, body: SetupBody | None = None):
         self.body = body

@@ -3,18 +3,34 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from typing import Any
 
+from palpate.errors import Error
 from palpate.mesh.tetrahedralize import STAGES
 from palpate.progress import Reporter
 from palpate.viewer.background import CancellableTask
+
+LOG = logging.getLogger(__name__)
 
 
 def status(text: str, progress: float | None = None, left_s: float | None = None) -> dict[str, Any]:
     """Message of a long work; an empty text ends it."""
     return {"type": "status", "text": text, "progress": progress, "left_s": left_s}
+
+
+def error_message(error: BaseException) -> dict[str, Any]:
+    """Message of what went wrong; a mistake of a user, a full disk, or one of the program."""
+    if isinstance(error, Error):
+        text = str(error)
+    elif isinstance(error, OSError) and error.strerror:
+        text = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+    else:
+        text = f"a mistake within palpate, please report it: {error!r}"
+        LOG.error("a mistake within palpate", exc_info=error)
+    return {"type": "error", "text": text}
 
 
 class StatusReporter(Reporter):
@@ -30,11 +46,11 @@ class StatusReporter(Reporter):
     work
         The work, which a page may cancel.
     send_all
-        Sends a message to all pages.
+        Sends a message to all pages, on the thread of the event loop.
 
     """
 
-    def __init__(self, text: str, work: CancellableTask, send_all: Callable[[dict[str, Any]], Awaitable[None]]):
+    def __init__(self, text: str, work: CancellableTask, send_all: Callable[[dict[str, Any]], None]):
         super().__init__(self._count, self._begin)
         self._text, self._work, self._send_all = text, work, send_all
         self._loop = asyncio.get_running_loop()
@@ -56,4 +72,4 @@ class StatusReporter(Reporter):
     def _send(self, part: float | None, left_s: float | None) -> None:
         text = f"{self._text}: {self._phase}" if self._phase else self._text
         message = status(text, part, left_s)
-        self._loop.call_soon_threadsafe(lambda: self._loop.create_task(self._send_all(message)))
+        self._loop.call_soon_threadsafe(self._send_all, message)

@@ -19,6 +19,7 @@ ENDINGS = (*SURFACE_ENDINGS, *SEGMENTATION_ENDINGS, *(ending for ending in WRITE
 MAX_FILE = 200_000_000
 # Bytes of a part: one message, which the server answers before the next comes.
 MAX_PART = 262_144
+# Bytes of a name; file systems take 255.
 LONGEST_NAME = 120
 
 
@@ -44,8 +45,8 @@ class Upload:
         if not self.file.lower().endswith(ENDINGS):
             raise ViewerError(_wrong_kind(self.file))
         if isinstance(message.get("size"), int) and message["size"] > MAX_FILE:
-            size, most = message["size"] / 1e6, MAX_FILE / 1e6
-            raise ViewerError(f"{self.file} has {size:.0f} MB: the page takes files up to {most:.0f} MB")
+            size, most = min(message["size"], 10**15) // 10**6, MAX_FILE // 10**6
+            raise ViewerError(f"{self.file} has {size} MB: the page takes files up to {most} MB")
         self.size = whole(message, "size", 1, MAX_FILE)
         self.folder, self.received = folder, 0
         self._output = (folder / self.file).open("wb")
@@ -90,8 +91,8 @@ def safe_name(name: Any) -> str:
         What is no name.
 
     """
-    if not isinstance(name, str) or len(name) > LONGEST_NAME:
-        raise ViewerError(f"upload: name must be a text of at most {LONGEST_NAME} characters")
+    if not isinstance(name, str) or len(name.encode("utf-8", "replace")) > LONGEST_NAME:
+        raise ViewerError(f"upload: name must be a text of at most {LONGEST_NAME} bytes")
     safe = re.sub(r"[^\w. -]", "_", name).strip(". ")
     if not Path(safe).stem.strip(". _"):
         raise ViewerError("upload: the file needs a name")

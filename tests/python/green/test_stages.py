@@ -15,6 +15,7 @@ from conftest import box_mesh, relative
 from stored_columns import child_program, rollers, touchable_square
 
 import palpate
+from palpate.green import BackgroundPrecompute
 
 FIRST = "x > 6cm"
 
@@ -247,3 +248,10 @@ def test_a_store_that_does_not_fit_the_disk_is_refused_with_what_would(body, tmp
     ):
         palpate.precompute(body, precision="f32", path=tmp_path / "a.palpate")
     assert not list(tmp_path.iterdir())
+
+
+def test_columns_whose_process_sends_nonsense_end_with_an_error():
+    growing = BackgroundPrecompute.__new__(BackgroundPrecompute)
+    growing._changed, growing._complete, growing.error = threading.Condition(), None, None
+    growing._listen([b'{"done": 1, "colu'])
+    assert "JSONDecodeError" in growing.error

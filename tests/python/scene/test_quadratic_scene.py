@@ -10,8 +10,9 @@ from viewer_client import frame_of
 
 import palpate
 from palpate.fields import SurfaceStrain
+from palpate.viewer.fields import ClientView
 from palpate.viewer.messages import decode
-from palpate.viewer.session import ClientView, Session
+from palpate.viewer.session import Session
 
 RADIUS, PATCH = 0.006, 0.012
 TOP = np.array([0.041, 0.026, 0.05])

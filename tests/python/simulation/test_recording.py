@@ -229,3 +229,14 @@ def test_texts_that_are_none_are_refused_in_one_line(built, monkeypatch):
         monkeypatch.setattr(simulation, "_about", lambda *_, about=about, **__: about)
         with pytest.raises(palpate.Error, match=r"^[^\n]*$"):
             palpate.replay(simulation.play(paths()[:5]), built if key != "scene" else None)
+
+
+def test_a_recording_that_cannot_begin_does_not_hold_the_series(block, block_green, monkeypatch, tmp_path):
+    held = []
+    native = palpate._native.hold_series
+    monkeypatch.setattr(palpate._native, "hold_series", lambda core, on: held.append(on) or native(core, on))
+    built = BuiltScene.of(palpate.Scene(body={"model": "beam"}, tool={"radius": "5mm"}), block, block_green)
+    with palpate.Simulation(built) as simulation:
+        with pytest.raises((palpate.Error, OSError)):
+            simulation.record("/proc/none/a.mcap")
+        assert not held or held[-1] is False

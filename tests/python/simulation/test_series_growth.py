@@ -6,12 +6,14 @@ import shutil
 import time
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import palpate
 from palpate.errors import SceneError
+from palpate.green import background_series
 from palpate.scene import BuiltScene, Scene
 from palpate.scene.series import with_series, with_stored_series
 from palpate.simulation import Simulation
@@ -192,3 +194,13 @@ def test_a_closed_path_into_the_unknown_part_gives_out_nothing(known_beam):
     assert steps.max() < 1e-2 * np.linalg.norm(partial, axis=1).max()
     work = np.cumsum((-0.5 * (partial[1:] + partial[:-1]) * np.diff(path, axis=0)).sum(axis=1))
     assert work.max() > 1e-5 and abs(work[-1]) < 1e-4 * work.max()
+
+
+def test_series_that_cannot_begin_are_not_complete(tmp_path, monkeypatch):
+    def none(_module):
+        raise BlockingIOError(11, "Resource temporarily unavailable")
+
+    monkeypatch.setattr(background_series, "start_child", none)
+    job = SimpleNamespace(key="a", radius=0.01, file=lambda: SimpleNamespace(path=tmp_path / "none"))
+    series = background_series.BackgroundSeries([job], lambda *_: None, lambda _: None)
+    assert not series.wait(20) and not series.is_complete and "temporarily unavailable" in series.error

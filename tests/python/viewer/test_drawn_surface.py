@@ -19,7 +19,8 @@ from palpate.validation.verify.grids import lattice, mapped
 from palpate.viewer import drawn_surface as module
 from palpate.viewer import messages
 from palpate.viewer.drawn_surface import drawn_surface
-from palpate.viewer.session import ClientView, Session
+from palpate.viewer.fields import ClientView
+from palpate.viewer.session import Session
 
 MOST = 3000
 

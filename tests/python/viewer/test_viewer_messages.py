@@ -9,7 +9,8 @@ from golden_messages import KINDS, content, stored
 import palpate
 from palpate.scene import BuiltScene
 from palpate.viewer import messages
-from palpate.viewer.session import ClientView, Session
+from palpate.viewer.fields import ClientView
+from palpate.viewer.session import Session
 
 
 @pytest.mark.parametrize("kind", KINDS)

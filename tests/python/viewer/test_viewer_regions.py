@@ -13,7 +13,8 @@ import palpate
 from palpate.mesh import TetMesh
 from palpate.scene import BuiltScene
 from palpate.viewer import messages
-from palpate.viewer.session import ClientView, Session
+from palpate.viewer.fields import ClientView
+from palpate.viewer.session import Session
 
 TOP = [0.04, 0.025, 0.05]
 

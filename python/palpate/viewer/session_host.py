@@ -1,0 +1,217 @@
+"""What a server shows, and how another session takes its place while pages stay connected."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Coroutine
+from typing import Any, TypeVar
+
+from palpate.errors import Error, ViewerError
+from palpate.viewer.background import CancellableTask, Worker
+from palpate.viewer.client import Client
+from palpate.viewer.computing import Computing
+from palpate.viewer.session import Session
+from palpate.viewer.setup_session import SetupSession
+from palpate.viewer.status import StatusReporter, error_message, status
+
+Shown = Session | SetupSession
+Result = TypeVar("Result")
+
+ONE_SCENE = "a recording is of one scene, and this one has another now"
+# How long the end of a server waits for a long work that was cancelled, s.
+CANCEL_PATIENCE = 5.0
+
+
+class SessionHost:
+    """A session, the thread that works with it, what is computed beside it, and the pages that show it.
+
+    One long work at a time prepares another session. All that touches the session is done on the worker's thread, one
+    thing after the other; what is done there asks for the session when its turn comes, not before.
+
+    Parameters
+    ----------
+    session
+        What is shown first.
+
+    """
+
+    def __init__(self, session: Shown):
+        self._session = session
+        self._computing = Computing(session.growing)
+        self._computing.begin()
+        session.start()
+        self._worker = Worker()
+        self._clients: list[Client] = []
+        self._controller: Client | None = None
+        self._building: CancellableTask | None = None
+        self._work: asyncio.Task[None] | None = None
+        # Of the long work, for pages that open meanwhile.
+        self._status: dict[str, Any] | None = None
+        self._loop: asyncio.AbstractEventLoop | None = None
+
+    # Pages.
+
+    def send_all(self, message: dict[str, Any] | None, but_control: bool = False) -> None:
+        """Send a message to all pages, or to those that watch; None is no message. On the thread of the event loop."""
+        if message is None:
+            return
+        if message["type"] == "status":
+            self._status = message if message["text"] else None
+        for client in self._clients:
+            if not (but_control and client is self._controller):
+                client.send(message)
+
+    def send_control(self, message: dict[str, Any]) -> None:
+        """Send a message to the page in control."""
+        if self._controller is not None:
+            self._controller.send(message)
+
+    async def send_settings(self) -> None:
+        """Send all pages what the sliders show."""
+        self.send_all(await self.with_session(lambda session: session.settings()))
+
+    # The session.
+
+    @property
+    def session(self) -> Shown:
+        """What is shown."""
+        return self._session
+
+    async def call(self, work: Callable[..., Result], *arguments: Any) -> Result:
+        """Do ``work(*arguments)`` on the worker's thread."""
+        return await self._worker.call(work, *arguments)
+
+    async def with_session(self, work: Callable[[Any], Result]) -> Result:
+        """Do ``work(session)`` on the worker's thread, with the session that is shown when its turn comes."""
+        return await self._worker.call(lambda: work(self._session))
+
+    def exchange(self, session: Shown) -> None:
+        """Put a session in the place of the one that runs, which goes on where the other does not start.
+
+        On the worker's thread. The old loop ends first: two at real-time priority would keep each other from their
+        deadlines. A recording of it ends, and pages get the message about that.
+        """
+        before = self._session
+        self._stop(before)
+        try:
+            session.start()
+        except BaseException as error:
+            discard(session)
+            self._resume(before)
+            if isinstance(error, Error):
+                raise type(error)(f"{error}; the scene shown before stays") from error
+            raise
+        self._session = session
+
+    def replace(self, session: Shown) -> None:
+        """Exchange sessions, and what is computed beside them."""
+        self.exchange(session)
+        self._computing.close()
+        self._computing = Computing(session.growing)
+        self._computing.begin()
+
+    def computed(self) -> dict[str, Any]:
+        """Message with what can be touched by now. On the worker's thread."""
+        return self._computing.message(self._session)
+
+    def take_computed(self) -> dict[str, Any] | None:
+        """Give the loop what has become ready: the message about it, if there is something new. On the same thread."""
+        return self._computing.step(self._session)
+
+    def restore(self, before: Shown) -> None:
+        """Put a session back that another had taken the place of. On the worker's thread."""
+        self._stop(self._session)
+        self._resume(before)
+
+    def _stop(self, session: Shown) -> None:
+        recorded = session.recorder.stop(ONE_SCENE)
+        if recorded is not None and self._loop is not None:
+            self._loop.call_soon_threadsafe(self.send_all, recorded)
+        session.release()
+        session.close()
+
+    def _resume(self, session: Shown) -> None:
+        session.resume()
+        self._session = session
+        # Its tools may be moved otherwise now: pages get the scene anew.
+        for client in self._clients:
+            client.shown = None
+
+    # Long work.
+
+    def begin_building(self) -> CancellableTask:
+        """Begin something long: one at a time.
+
+        Raises
+        ------
+        ViewerError
+            Another is not done.
+
+        """
+        self.require_idle()
+        self._building = CancellableTask()
+        return self._building
+
+    @property
+    def is_building(self) -> bool:
+        """Whether something long is under way."""
+        return self._building is not None
+
+    def require_idle(self) -> None:
+        """Refuse what would get in the way of a long work.
+
+        Raises
+        ------
+        ViewerError
+            One is under way.
+
+        """
+        if self.is_building:
+            raise ViewerError("wait until what is being prepared is ready, or cancel it")
+
+    def work(self, coroutine: Coroutine[Any, Any, None]) -> None:
+        """Do the long work that has begun, beside all else."""
+        self._work = asyncio.create_task(coroutine)
+
+    def cancel(self) -> None:
+        """Cancel the long work, if there is one."""
+        if self._building is not None:
+            self._building.cancel()
+
+    async def end_work(self) -> None:
+        """Cancel the long work, and wait until pages have its end."""
+        self.cancel()
+        if self._work is not None:
+            await asyncio.wait({self._work}, timeout=CANCEL_PATIENCE)
+
+    def finish_building(self) -> None:
+        """Let another long work begin, and send pages that this one has ended."""
+        self._building = None
+        self.send_all(status(""))
+
+    def reporter(self, text: str, work: CancellableTask) -> StatusReporter:
+        """Send all pages how far a long work is."""
+        return StatusReporter(text, work, self.send_all)
+
+    async def switch(
+        self, text: str, make: Callable[[], Session], exchange: Callable[[Session], None], building: CancellableTask
+    ) -> None:
+        """Make a session beside the one that runs, and put it in its place."""
+        try:
+            self.send_all(status(text))
+            await self.with_session(lambda session: session.release())
+            session = await building.run(make, discard)
+            await self.call(exchange, session)
+        except Exception as error:
+            # None of any kind may leave the pages without a message.
+            self.send_all(error_message(error))
+        finally:
+            await self.send_settings()
+            self.finish_building()
+
+
+def discard(session: Shown) -> None:
+    """End a session that is not shown, and what is computed beside it."""
+    session.close()
+    for background in session.growing.values():
+        background.close()
