@@ -14,6 +14,17 @@ from palpate.errors import Error
 from palpate.leftovers import is_leftover, remove_leftovers
 
 
+@contextlib.contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Name a file in errors of the system that do not: a full disk is found by its file."""
+    try:
+        yield
+    except OSError as error:
+        if error.filename is None:
+            error.filename = os.fspath(path)
+        raise
+
+
 def destination(path: Path, error: type[Error] = Error) -> Path:
     """File that is written for ``path``: the one that a symbolic link names, so that the link stays.
 

@@ -156,6 +156,20 @@ describe("what is shown", () => {
     expect(sent.at(-1)).toEqual({ type: "field", name: "strain" });
   });
 
+  it("sends no value of the scene before to the next one", () => {
+    control.setFriction(0.5);
+    control.setFriction(0.9);
+    control.receiveScene({ ...scene(2), name: "another" });
+    vi.runAllTimers();
+    expect(sent).toEqual([{ type: "set", friction: 0.5, tool: 0 }]);
+  });
+
+  it("shows no work that ended while it was away", () => {
+    control.receiveText({ type: "status", text: "Solving", progress: 0.5, left_s: null });
+    control.receiveText({ type: "welcome", role: "control", version: "1", models: [] });
+    expect(store.get().status).toBeNull();
+  });
+
   it("is reset with all that was on its way", () => {
     control.setFriction(0.5);
     control.setFriction(0.9);

@@ -58,7 +58,8 @@ export class Control {
   receiveText(message: TextMessage): void {
     switch (message.type) {
       case "welcome":
-        this.store.update({ version: message.version, models: message.models });
+        // A long work that ended while the page was away sends no end.
+        this.store.update({ version: message.version, models: message.models, status: null });
         return this.receiveRole(message.role);
       case "role":
         return this.receiveRole(message.role);
@@ -89,6 +90,8 @@ export class Control {
       shape === before?.tools[tool]?.shape ? postures[tool]! : firstPosture(shape);
     const offered = scene.bodies[0]?.fields.some(({ name }) => name === field) ?? false;
     this.changedMs = -Infinity;
+    // Values that wait to be sent are of the scene before.
+    if (before?.name !== scene.name) for (const { limit } of this.limits.values()) limit.cancel();
     clearTimeout(this.firstStrike);
     // Another tool on the same body is no reason to strike it.
     if (before?.name !== scene.name && scene.motion?.strike)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -86,8 +86,8 @@ def map_command(
     built = _build_scene(file, RunOptions(radius=radius, fix=fix, **material, **lengths))
     folder = out if out is not None else Path(f"{file.stem}-palpation")
     with _folder(folder):
-        found, detection = _palpate(built, folder, given, on, strokes, against)
-    _print_result(found, detection, folder)
+        found, detection, written = _palpate(built, folder, given, on, strokes, against)
+    _print_result(found, detection, folder, written)
 
 
 def _quantities() -> tuple[Callable[[str, str], float], Callable[[str, str], float]]:
@@ -145,10 +145,11 @@ def _folder(folder: Path) -> Any:
 
 def _palpate(
     built: BuiltScene, folder: Path, given: dict[str, float], on: str | None, strokes: bool, against: Path | None
-) -> tuple[StiffnessMap, Detection | None]:
+) -> tuple[StiffnessMap, Detection | None, list[Path]]:
     """Palpate, write, and forget what was kept for going on."""
     from palpate.palpation import compare, stiffness_map
     from palpate.palpation.detection import has_several_materials
+    from palpate.palpation.files import DETECTION_FILES
     from palpate.scene import Scene
 
     other = None if against is None else Scene.read(against)
@@ -169,15 +170,19 @@ def _palpate(
             file=sys.stderr,
         )
         raise typer.Exit(130) from None
-    found.save(folder)
+    written = found.save(folder)
     if detection is not None:
-        detection.save(folder)
+        written += detection.save(folder)
+    else:
+        # Those of an earlier scene would be taken for this one's.
+        for name in DETECTION_FILES:
+            (folder / name).unlink(missing_ok=True)
     for name in (PARTIAL, PLAIN_PARTIAL):
         (folder / name).unlink(missing_ok=True)
-    return found, detection
+    return found, detection, written
 
 
-def _print_result(found: StiffnessMap, detection: Detection | None, folder: Path) -> None:
+def _print_result(found: StiffnessMap, detection: Detection | None, folder: Path, written: Sequence[Path]) -> None:
     """Say what was found, what was left out, and what held the tool."""
     import numpy as np
 
@@ -196,7 +201,7 @@ def _print_result(found: StiffnessMap, detection: Detection | None, folder: Path
         print(f"nodule under {_millimetres(nodule.place)}: {change}, half of it {1e3 * nodule.half_width:.2g} mm away")
     if detection is not None and not detection.nodules:
         print("no nodule: nothing differs by more than 2 %")
-    print(f"wrote {folder}: " + ", ".join(sorted(path.name for path in folder.iterdir())))
+    print(f"wrote {folder}: " + ", ".join(sorted(path.name for path in written)))
 
 
 def _millimetres(place: Any) -> str:

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
+import errno
+import io
+import os
 from pathlib import Path
 
 import numpy as np
@@ -84,19 +88,36 @@ class Record:
 
     def add(self, course: Course, answered: TrialAnswer) -> None:
         """Write the row of an answer; it is on the disk when this returns."""
-        new = not self._path.exists() or self._path.stat().st_size == 0
-        with self._path.open("a", newline="") as stream:
-            writer = csv.DictWriter(stream, COLUMNS)
-            if new:
-                writer.writeheader()
-            writer.writerow(row_of(course, answered))
+        text = io.StringIO(newline="")
+        writer = csv.DictWriter(text, COLUMNS)
+        whole = self._path.stat().st_size if self._path.exists() else 0
+        if whole == 0:
+            writer.writeheader()
+        writer.writerow(row_of(course, answered))
+        try:
+            with self._path.open("ab", buffering=0) as stream:
+                if stream.write(content := text.getvalue().encode()) != len(content):
+                    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), os.fspath(self._path))
+                os.fsync(stream.fileno())
+        except OSError:
+            # The next answer must not be appended to a part of this one.
+            with contextlib.suppress(OSError):
+                os.truncate(self._path, whole)
+            raise
 
     def _read(self) -> list[dict[str, str]]:
-        with self._path.open(newline="", errors="replace") as stream:
-            reader = csv.DictReader(stream)
-            rows = list(reader)
-            if reader.fieldnames is not None and tuple(reader.fieldnames) != COLUMNS:
-                raise SceneError(f"{self._path}:1: not the table of an exam; give another --out")
+        """Rows of the table, without one that was not written to its end, which is cut off: its trial comes again."""
+        content = self._path.read_bytes()
+        whole = content.rfind(b"\n") + 1
+        reader = csv.DictReader(io.StringIO(content[:whole].decode(errors="replace"), newline=""))
+        rows = list(reader)
+        if reader.fieldnames is not None and tuple(reader.fieldnames) != COLUMNS:
+            raise SceneError(f"{self._path}:1: not the table of an exam; give another --out")
+        for line, row in enumerate(rows, 2):
+            if None in row:
+                raise SceneError(f"{self._path}:{line}: more cells than columns; give another --out")
+        if whole < len(content):
+            os.truncate(self._path, whole)
         return rows
 
     def _replay(self, course: Course, row: dict[str, str], line: int) -> None:

@@ -6,9 +6,12 @@ import contextlib
 import os
 import signal
 import subprocess
+import tempfile
 import time
 from collections.abc import Callable
 
+# Exit status of a mesher's process that could not read or write its files.
+FILES_FAILED = 3
 OUT_OF_PROCESSOR_TIME = "used up its processor time and was stopped"
 # How often a child's stage is looked at, s.
 LOOK = 0.1
@@ -59,4 +62,6 @@ def failure_of(status: int | None, time_limit: float) -> str | None:
         return OUT_OF_PROCESSOR_TIME
     if status < 0:
         return f"crashed ({signal.Signals(-status).name})"
+    if status == FILES_FAILED:
+        return f"could not write its files in {tempfile.gettempdir()} (is there room on that disk?)"
     return "returned no tetrahedra" if status else None

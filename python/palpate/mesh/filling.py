@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.errors import MeshError, MeshWarning
-from palpate.mesh.child import OUT_OF_PROCESSOR_TIME, failure_of, run_limited
+from palpate.mesh.child import FILES_FAILED, OUT_OF_PROCESSOR_TIME, failure_of, run_limited
 from palpate.mesh.curve import curve, refine
 from palpate.mesh.fill_job import PARTS, FillJob, length_text
 from palpate.mesh.fit import GOOD_LOSS, Fit, mean_edge
@@ -190,6 +190,8 @@ class Filling:
                 command = [sys.executable, "-m", "palpate.mesh.netgen_child", route, str(surface_file), str(mesh_file)]
                 status = run_limited(command, max(deadline - time.monotonic(), 0.0))
                 failure = failure_of(status, self.job.time_limit)
+                if status == FILES_FAILED:
+                    raise MeshError(f"{self.name}: NETGEN {failure}")
                 if failure is None and mesh_file.exists():
                     with np.load(mesh_file) as result:
                         return result["nodes"], result["tets"]

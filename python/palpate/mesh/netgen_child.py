@@ -2,7 +2,8 @@
 
 The route ``remesh`` makes a new surface of even triangles and fills it; ``keep`` fills the surface exactly as given.
 
-Exit status 1: no tetrahedra. Anything the mesher does to this process hurts nobody else.
+Exit status 1: no tetrahedra; 3: files that cannot be written, for which another route is no remedy. Anything the mesher
+does to this process hurts nobody else.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate._native import end_with_parent
+from palpate.mesh.child import FILES_FAILED
 from palpate.mesh.triangles import area_vectors, units
 
 if TYPE_CHECKING:
@@ -104,4 +106,7 @@ def _write_stl(path: Path, corners: np.ndarray) -> None:
 
 if __name__ == "__main__":
     end_with_parent()
-    sys.exit(main(*sys.argv[1:4]))
+    try:
+        sys.exit(main(*sys.argv[1:4]))
+    except OSError:
+        sys.exit(FILES_FAILED)

@@ -68,10 +68,9 @@ class Link:
         if message.kind == "TRANSFORM" and message.device == BODY:
             self.axes.place(read_transform(message))
         elif message.kind == "TRANSFORM" and message.device.startswith(TOOL):
-            matrix = read_transform(message)
             tool = _rank(message.device)
             if simulation is not None and tool is not None and tool < len(simulation.scene.tools):
-                self._move(simulation, tool, matrix, peer, now)
+                self._move(simulation, tool, read_transform(message), peer, now)
         elif message.kind == "STRING" and message.device == COMMAND:
             return pack("STRING", ANSWER, string_content(self._command(simulation, read_string(message))), time.time())
         return None

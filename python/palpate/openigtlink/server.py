@@ -44,7 +44,7 @@ class LinkServer:
     Raises
     ------
     ViewerError
-        A port that is in use, or a host that this machine does not have.
+        A port that is in use, a host that this machine does not have, or a tracker whose name is unknown.
 
     """
 
@@ -57,7 +57,8 @@ class LinkServer:
         rate: float = 100.0,
         tracker: tuple[str, int] | None = None,
     ):
-        self.link, self._period, self._tracker = link, 1.0 / rate, tracker
+        self.link, self._period = link, 1.0 / rate
+        self._tracker = None if tracker is None else _resolved(*tracker)
         self._selector = selectors.DefaultSelector()
         self._peers: dict[socket.socket, Peer] = {}
         self._listener: socket.socket | None = None
@@ -184,6 +185,16 @@ class LinkServer:
             called.close()
             return
         self._add(called, f"{self._tracker[0]}:{self._tracker[1]}")
+
+
+def _resolved(host: str, port: int) -> tuple[str, int]:
+    """Address of a tracker: what is looked up later would keep the peers waiting."""
+    try:
+        found = socket.getaddrinfo(host, port, socket.AF_INET, socket.SOCK_STREAM)
+    except (OSError, OverflowError, UnicodeError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise ViewerError(f"OpenIGTLink: the host '{host}' of --igtl-from is unknown: {reason}") from None
+    return found[0][4][:2]  # type: ignore[return-value]
 
 
 def _listening(host: str, port: int) -> socket.socket:

@@ -141,7 +141,8 @@ def compare(
     built = against if isinstance(against, BuiltScene) else against.build(progress=progress)
     # The tool and the device are those of the map: what differs is the bodies.
     ours = found.scene.scene
-    scene = built.scene.model_copy(update={"tools": ours.tools, "device": ours.device, "view": ours.view})
+    tools = [tool.in_folder(ours.folder) for tool in ours.tools]
+    scene = built.scene.model_copy(update={"tools": tools, "device": ours.device, "view": ours.view})
     built = replace(built, scene=scene)
     simulation = Simulation(probe(built))
     protocol = Protocol(found.spacing, found.depth, found.speed, bool((found.strokes >= 0).any()))

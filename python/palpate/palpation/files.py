@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     import meshio
 
 XYZ = ("x_m", "y_m", "z_m")
+DETECTION_FILES = ("detection.csv", "nodules.csv", "detection.vtu", "detection.png")
 
 
 def save_map(found: MapRecord, folder: Path) -> list[Path]:
@@ -37,8 +38,7 @@ def save_map(found: MapRecord, folder: Path) -> list[Path]:
 def save_detection(detection: DetectionRecord, folder: Path) -> list[Path]:
     """See :meth:`Detection.save`."""
     folder.mkdir(parents=True, exist_ok=True)
-    names = ("detection.csv", "nodules.csv", "detection.vtu", "detection.png")
-    table, nodules, surface, picture = paths = [folder / name for name in names]
+    table, nodules, surface, picture = paths = [folder / name for name in DETECTION_FILES]
     found = detection.found
     columns = {
         "point": np.arange(len(found.points)),

@@ -7,13 +7,14 @@ tick. What a killed process left behind the last whole run is cut off. A file wi
 
 from __future__ import annotations
 
-import os
 import struct
 import zlib
 from pathlib import Path
 from types import TracebackType
 
 import numpy as np
+
+from palpate.atomic import naming
 
 MARK = b"palpate palpation 1\n"
 _HEAD = struct.Struct("<III")
@@ -65,7 +66,9 @@ class PartialFile:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         if self._stream is not None:
-            self._stream.close()
+            # What could not be written is tried again.
+            with naming(self._path):
+                self._stream.close()
 
     def keep(self, rank: int, run: Run) -> None:
         """Add a finished run; it is in the system's hands when this returns."""
@@ -74,12 +77,9 @@ class PartialFile:
             return
         forces, limited = run
         content = np.asarray(forces, dtype="<f8").tobytes() + np.asarray(limited, dtype="u1").tobytes()
-        try:
+        with naming(self._path):
             self._stream.write(_HEAD.pack(rank, len(limited), zlib.crc32(content)) + content)
             self._stream.flush()
-        except OSError as error:
-            error.filename = os.fspath(self._path)
-            raise
 
     def remove(self) -> None:
         """Take the file away: what it held stands elsewhere."""
@@ -92,7 +92,8 @@ class PartialFile:
         while at + _HEAD.size <= len(content):
             rank, ticks, check = _HEAD.unpack_from(content, at)
             begin, end = at + _HEAD.size, at + _HEAD.size + 25 * ticks
-            if end > len(content) or zlib.crc32(content[begin:end]) != check:
+            # Zeros, as power losses leave them, are no run.
+            if ticks == 0 or end > len(content) or zlib.crc32(content[begin:end]) != check:
                 break
             forces = np.frombuffer(content, "<f8", 3 * ticks, begin).reshape(-1, 3)
             self.runs[rank] = forces, np.frombuffer(content, "u1", ticks, begin + 24 * ticks).astype(bool)

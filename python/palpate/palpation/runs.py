@@ -11,10 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
+from palpate.body import surface_strain_terms
 from palpate.errors import SimulationError
 from palpate.palpation.partial import PartialFile, Run
 from palpate.progress import progress_reporter
-from palpate.scene import BodyMotion, BuiltScene
+from palpate.scene import BodyMotion, BuiltBody, BuiltScene
 from palpate.simulation import Simulation
 
 # What of a device is for a hand alone: a palpation has none. The limit of force stands, and what it holds is told.
@@ -82,6 +83,7 @@ def key_of(simulation: Simulation, paths: Sequence[Path3D]) -> str:
         "version": version("palpate"),
         "bodies": [(body.green.key, body.position, body.orientation) for body in simulation.bodies],
         "motions": repr(motions),
+        "laws": [_laws_of(body) for body in simulation.bodies],
         "tools": [tool.model_dump() for tool in scene.tools],
         "shape": repr(scene.tools[0].shape_arguments(scene.folder)),
         "device": scene.device.model_dump(),
@@ -95,5 +97,13 @@ def key_of(simulation: Simulation, paths: Sequence[Path3D]) -> str:
     return digest.hexdigest()
 
 
+def _laws_of(body: BuiltBody) -> str | None:
+    """Hash of what the laws of a body's materials differ in: a store holds their constants at small strain only."""
+    return None if body.body is None else hashlib.sha256(surface_strain_terms(body.body).tobytes()).hexdigest()
+
+
 def _motion_of(motion: BodyMotion | None) -> tuple[object, ...] | None:
-    return None if motion is None else (motion.basis.key, motion.scheme, motion.exact, motion.coupling)
+    if motion is None:
+        return None
+    modes = motion.basis.eigenvalues.tolist()  # some of those of its key
+    return (motion.basis.key, modes, motion.scheme, motion.exact, motion.coupling)

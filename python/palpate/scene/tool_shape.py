@@ -68,6 +68,10 @@ class ShapeTable(Table):
             raise ValueError(f"rounding is {self.rounding:g} m, more than the radius of {self.radius:g} m")
         return self
 
+    def in_folder(self, folder: Path) -> ShapeTable:
+        """Return the same tool for a scene of any folder: its surface file by its whole path."""
+        return self if self.shape in KEYS else self.model_copy(update={"shape": str((folder / self.shape).absolute())})
+
     @property
     def reach(self) -> float:
         """From the tool's origin to its front along -z, m; of a surface file 0, because its origin may lie anywhere."""

@@ -165,20 +165,24 @@ class Simulation(Adjustable, SeriesGrowth, SceneEditing):
         self._start(dict)
 
     def _start(self, connected: Callable[[], dict[int, str]]) -> None:
-        if not self._running:
-            self._arm_strain_limit()
-            self._devices = connected()
-            RUNNING.add(self)
-            try:
-                start_loop(self._core, self.scene.device)
-                self._running = True
-                self._begin_series()
-                if self._to_record is not None:
-                    path, self._to_record = self._to_record, None
-                    self._begin_recording(path)
-            except BaseException:
-                self.stop()
-                raise
+        with self._editing:
+            if not self._running:
+                self._start_now(connected)
+
+    def _start_now(self, connected: Callable[[], dict[int, str]]) -> None:
+        self._arm_strain_limit()
+        self._devices = connected()
+        RUNNING.add(self)
+        try:
+            start_loop(self._core, self.scene.device)
+            self._running = True
+            self._begin_series()
+            if self._to_record is not None:
+                path, self._to_record = self._to_record, None
+                self._begin_recording(path)
+        except BaseException:
+            self.stop()
+            raise
 
     def stop(self) -> None:
         """Stop the loop; devices are left at zero force, and closed."""

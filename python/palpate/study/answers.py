@@ -6,10 +6,11 @@ import hashlib
 import json
 import tempfile
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 import numpy as np
 
@@ -22,7 +23,9 @@ from palpate.mesh import TetMesh
 from palpate.mesh.triangles import closest_on
 from palpate.scene import mesh_of_body, unsolved_body
 from palpate.scene.default_radius import PART_OF_BODY, default_contact_radius
-from palpate.scene.regions import MaterialTable
+from palpate.scene.node_file import is_node_file
+from palpate.scene.regions import CONSTANTS, MaterialTable
+from palpate.scene.tables import SupportsTable
 from palpate.study.tables import PressTable, StudyScene
 
 # Of a store with a handful of columns nothing is gained by fewer bits.
@@ -36,8 +39,10 @@ PARTS = {".node": (".ele", ".face", ".edge"), ".ele": (".node", ".face", ".edge"
 # Patches are weighed on curved faces: farther out than their flat triangles.
 MARGIN = 1.1
 
-# Keys of a body that decide its mesh.
-MESH_KEYS = {"mesh", "model", "paper", "unit", "max_element_size", "element", "refine"}
+# Keys of a part that give it a stiffness of its own.
+STIFFNESS = ("youngs_modulus", "law", *CONSTANTS)
+# Keys of a body that decide its mesh, besides its file and the names of its segments.
+MESH_KEYS = {"model", "paper", "unit", "max_element_size", "element", "refine", "mesher", "part", "max_volume_loss"}
 
 
 @dataclass(frozen=True)
@@ -60,22 +65,40 @@ class Answers:
     problem: str = ""
 
 
-def files_of(scene: StudyScene) -> list[Path]:
-    """Files that the mesh of a body is read from; none of a built-in model."""
-    mesh = scene.bodies[0].mesh
-    if mesh is None:
+def files_of(scene: StudyScene) -> dict[str, Path]:
+    """Files that a body is made of, by their names beside that of its mesh: mesh, buffers of glTF, supported nodes."""
+    body = scene.bodies[0]
+    supports = scene.supports if body.supports is None else body.supports
+    files = {}
+    if body.mesh is not None:
+        file = scene.folder / body.mesh
+        parts = [file.with_suffix(ending) for ending in PARTS.get(file.suffix.lower(), ())]
+        files = {part.name: part for part in (file, *parts) if part == file or part.is_file()}
+        files |= {name: file.parent / name for name in _buffers(file)}
+    if supports is not None and is_node_file(supports.fixed) and (scene.folder / supports.fixed).is_file():
+        files[Path(supports.fixed).name] = scene.folder / supports.fixed
+    return files
+
+
+def _buffers(file: Path) -> list[str]:
+    """Names of the files of a glTF scene."""
+    if file.suffix.lower() != ".gltf":
         return []
-    file = scene.folder / mesh
-    parts = [file.with_suffix(ending) for ending in PARTS.get(file.suffix.lower(), ())]
-    return [file, *(part for part in parts if part.is_file())]
+    try:
+        buffers = json.loads(file.read_bytes()).get("buffers", [])
+        names = [unquote(buffer["uri"]) for buffer in buffers if not buffer.get("uri", "data:").startswith("data:")]
+    except (OSError, ValueError, AttributeError, TypeError):
+        return []  # not a file that can be read: the error comes where it is
+    return [name for name in names if (file.parent / name).is_file()]
 
 
-def mesh_key(scene: StudyScene, read: Callable[[Path], bytes] = Path.read_bytes) -> str:
-    """Hash of everything that decides the mesh of a body."""
-    tables = scene.bodies[0].model_dump(mode="json", include=MESH_KEYS - {"mesh"})
+def mesh_key(scene: StudyScene) -> str:
+    """Hash of everything that decides the mesh of a body, and of its supported nodes."""
+    body = scene.bodies[0]
+    tables = {**body.model_dump(mode="json", include=MESH_KEYS), "segment": [segment.name for segment in body.segment]}
     key = hashlib.sha256(json.dumps(tables, sort_keys=True).encode())
-    for file in files_of(scene):
-        key.update(file.suffix.encode() + hashlib.sha256(read(file)).digest())
+    for name, file in files_of(scene).items():
+        key.update(Path(name).suffix.encode() + hashlib.sha256(file.read_bytes()).digest())
     return key.hexdigest()
 
 
@@ -97,16 +120,22 @@ def case_key(scene: StudyScene) -> str:
 
 
 def youngs_modulus(scene: StudyScene) -> float:
-    """Young's modulus of a body, but for its regions."""
-    return (scene.bodies[0].material or scene.material).youngs_modulus
+    """Young's modulus of a body, but for its regions; that of its constants where it has some."""
+    return _material(scene).material().youngs_modulus
+
+
+def _material(scene: StudyScene) -> MaterialTable:
+    return scene.bodies[0].material or scene.material
 
 
 def scales_with_modulus(scene: StudyScene) -> bool:
-    """Whether Young's modulus is the same everywhere, and nothing but touches loads the body."""
+    """Whether Young's modulus is given and the same everywhere, and nothing but touches loads the body."""
     body = scene.bodies[0]
     loads = scene.loads if body.loads is None else body.loads
     regions = scene.region if body.region is None else body.region
-    return not loads and all(region.youngs_modulus is None for region in regions)
+    of_constants = any(getattr(_material(scene), name) is not None for name in CONSTANTS)
+    parts = [*regions, *body.segment]
+    return not loads and not of_constants and all(getattr(part, name) is None for part in parts for name in STIFFNESS)
 
 
 def answers(scenes: Sequence[StudyScene]) -> list[Answers]:
@@ -136,17 +165,28 @@ def answers_elsewhere(version: str, scenes: Sequence[StudyScene], files: Sequenc
     use_threads_of_worker()
     with tempfile.TemporaryDirectory(prefix="palpate-study-") as folder:
         for name, content in files:
-            (Path(folder) / name).write_bytes(content)
+            file = Path(folder) / name
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_bytes(content)
         moved = []
         for scene in scenes:
             path, text = scene.source
             body = scene.bodies[0]
             name = None if body.mesh is None else Path(body.mesh).name
-            here = scene.model_copy(update={"bodies": [body.model_copy(update={"mesh": name})]})
+            moved_body = {"mesh": name, "supports": _beside(body.supports)}
+            here = {"bodies": [body.model_copy(update=moved_body)], "supports": _beside(scene.supports)}
+            here = scene.model_copy(update=here)
             here.replace_source(Path(folder) / path.name, text)
             moved.append(here)
         home = str(scenes[0].source[0].parent)
         return [Answers(a.rows, a.notes, a.problem.replace(folder, home)) for a in answers(moved)]
+
+
+def _beside(supports: SupportsTable | None) -> SupportsTable | None:
+    """Supports whose file of nodes, if they have one, lies beside the scene."""
+    if supports is None or not is_node_file(supports.fixed):
+        return supports
+    return supports.model_copy(update={"fixed": Path(supports.fixed).name})
 
 
 _meshes: dict[str, TetMesh] = {}

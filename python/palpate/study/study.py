@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from palpate import _native
+from palpate.atomic import naming
 from palpate.cluster import connected, result_of, spread, submit
 from palpate.errors import SceneError
 from palpate.input_file import read_toml, require_file
@@ -61,7 +62,7 @@ class Study:
         path = Path(path)
         text, tables = read_toml(path, SceneError)
         cases = cases_of(path, text, tables)
-        for file in {file for case in cases for file in files_of(case.scene)[:1]}:
+        for file in {file for case in cases for file in list(files_of(case.scene).values())[:1]}:
             require_file(file, SceneError)
         return cls(path, cases)
 
@@ -129,7 +130,7 @@ class Study:
 
             def start(ranks: list[int], address: str) -> Any:
                 scenes = [self.cases[k].scene for k in ranks]
-                files = [(file.name, file.read_bytes()) for file in files_of(scenes[0])]
+                files = [(name, file.read_bytes()) for name, file in files_of(scenes[0]).items()]
                 return submit(client, answers_elsewhere, _native.__version__, scenes, files, address=address)
 
             with contextlib.closing(spread(client, groups[::-1], start)) as solved:
@@ -147,11 +148,12 @@ class _AnswerFile:
             if not line.endswith(b"\n"):
                 break
             whole += len(line)
-            with contextlib.suppress(ValueError, KeyError, TypeError):
+            with contextlib.suppress(ValueError, KeyError, TypeError, AttributeError):
                 record = json.loads(line)
                 if record.pop("sum") == _sum(record):
                     key = record.pop("key")
                     self.known[key] = Answers(**record)
+        self._path = path
         self._stream = path.open("r+b" if path.is_file() else "wb")
         self._stream.truncate(whole)
         self._stream.seek(whole)
@@ -160,13 +162,15 @@ class _AnswerFile:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._stream.close()
+        with naming(self._path):
+            self._stream.close()
 
     def keep(self, key: str, answer: Answers) -> None:
         """Add what a body has answered; it is in the system's hands when this returns."""
         line = {"key": key, **asdict(answer)}
-        self._stream.write(json.dumps({**line, "sum": _sum(line)}).encode() + b"\n")
-        self._stream.flush()
+        with naming(self._path):
+            self._stream.write(json.dumps({**line, "sum": _sum(line)}).encode() + b"\n")
+            self._stream.flush()
 
 
 def _sum(line: Mapping[str, Any]) -> str:

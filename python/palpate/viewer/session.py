@@ -362,7 +362,7 @@ class Session:
         return {
             "position": position.tolist(),
             "orientation": frame.orientations[tool].tolist(),
-            "active": bool(frame.active[tool]) if tool in self.simulation.devices else self._active[tool],
+            "active": bool(frame.active[tool]),
             "limited": limited,
             # Where the device is, while the tool does not follow it.
             "wanted": device.tolist() if limited else None,

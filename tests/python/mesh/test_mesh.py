@@ -132,6 +132,7 @@ def test_mesher_that_hangs_or_crashes_is_reported(tmp_path, monkeypatch):
         ("import time; time.sleep(60)", "did not finish in 1 s"),
         ("import os; os.abort()", "crashed .SIGABRT."),
         ("pass", "returned no tetrahedra"),
+        ("import sys; sys.exit(3)", "could not write its files in /.* .is there room on that disk.."),
     ]:
         fake = tmp_path / "fake.sh"
         fake.write_text(
@@ -145,6 +146,16 @@ def test_mesher_that_hangs_or_crashes_is_reported(tmp_path, monkeypatch):
             patch.setattr(sys, "executable", str(fake))
             with pytest.raises(palpate.MeshError, match=message):
                 tetrahedralize(ball, time_limit=1 if "sleep" in program else 60)
+
+
+def test_a_full_temporary_folder_is_no_reason_for_another_mesh(tmp_path, monkeypatch):
+    """The surface as given would be filled instead, with elements of another size, and nobody would see it."""
+    fake = tmp_path / "fake.sh"
+    fake.write_text(f'#!/bin/sh\n[ "$3" = remesh ] && exit 3\nexec {sys.executable} "$@"\n')
+    fake.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(fake))
+    with pytest.raises(palpate.MeshError, match="NETGEN could not write its files in"):
+        tetrahedralize(trimesh.creation.icosphere(subdivisions=2, radius=0.04), mesher="netgen")
 
 
 def test_self_intersecting_surface_is_reported():

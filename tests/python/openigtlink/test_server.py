@@ -204,6 +204,12 @@ def test_a_tracker_that_is_a_server_is_called(simulation, tmp_path):
                     time.sleep(0.05)
 
 
+def test_a_tracker_of_an_unknown_name_is_refused(simulation, tmp_path):
+    for host in ("no-such-host.invalid", "ä..b"):
+        with pytest.raises(palpate.Error, match="of --igtl-from is unknown"):
+            LinkServer(Link(lambda: simulation, folder=tmp_path), None, tracker=(host, 18944))
+
+
 def test_a_port_in_use_is_refused_by_its_number(server, simulation):
     with pytest.raises(palpate.ViewerError, match=str(server.port)):
         LinkServer(Link(lambda: simulation), server.port)

@@ -6,6 +6,7 @@ import csv
 
 import numpy as np
 import pytest
+import trimesh
 from palpated import HEIGHT, SIDE, TOP, block_body, scene_of
 
 import palpate
@@ -59,3 +60,16 @@ def test_a_body_of_another_shape_is_refused(top, store):
     lower = palpate.precompute(body, path=store.with_name("lower.palpate"))
     with pytest.raises(palpate.SceneError, match="has another shape: its surface lies up to 4 mm off"):
         compare(top, scene_of(lower.path))
+
+
+def test_the_tool_of_a_map_is_that_of_its_own_folder(store, tmp_path):
+    stiffer = tmp_path / "stiffer.palpate"
+    palpate.precompute(block_body(12e3), precision="f64", path=stiffer)
+    for name, radius, file in (("ours", 0.005, store), ("theirs", 0.002, stiffer)):
+        (tmp_path / name).mkdir()
+        trimesh.creation.icosphere(2, radius).export(tmp_path / name / "tip.stl")
+        text = f'[body]\nstore = "{file}"\n[tool]\nshape = "tip.stl"\nunit = "m"\n[view]\nstrain_limit = 0\n'
+        (tmp_path / name / "scene.toml").write_text(text)
+    ours, theirs = (palpate.Scene.read(tmp_path / name / "scene.toml") for name in ("ours", "theirs"))
+    found = stiffness_map(ours, "30mm", "0.3mm", on=TOP)
+    assert compare(found, theirs).ratio == pytest.approx(10 / 12, rel=1e-3)

@@ -6,11 +6,13 @@ import signal
 import subprocess
 import sys
 import time
+from types import SimpleNamespace
 
 import pytest
-from palpated import TOP, scene_of
+from palpated import TOP, block_body, scene_of
 
-from palpate.palpation import stiffness_map
+import palpate
+from palpate.palpation import runs, stiffness_map
 from palpate.palpation.partial import MARK
 
 
@@ -54,6 +56,25 @@ def test_what_a_killed_process_left_half_written_is_made_again(block, whole, tmp
         partial.write_bytes(damaged)
         again = stiffness_map(block, "20mm", "0.3mm", on=TOP, partial=partial)
         assert again.resumed == known and again == whole
+
+
+def test_zeros_that_a_power_loss_left_are_no_press(block, whole, tmp_path):
+    partial = tmp_path / "kept.partial"
+    interrupted(block, partial, 4)
+    partial.write_bytes(partial.read_bytes() + bytes(4096))
+    again = stiffness_map(block, "20mm", "0.3mm", on=TOP, partial=partial)
+    assert again.resumed == 4 and again == whole
+
+
+def test_laws_and_modes_belong_to_the_key_of_a_palpation(tmp_path):
+    """A store holds constants at small strain only, and the key of modes is that of all that were computed."""
+    plain = block_body()
+    other = palpate.Body(plain.mesh, material=palpate.Material(10e3, 0.45, law="neo-hookean"), fixed=plain.fixed_nodes)
+    laws = [runs._laws_of(SimpleNamespace(body=body)) for body in (plain, other, None)]
+    assert len(set(laws)) == 3
+    basis = palpate.modes(plain, 4, path=tmp_path / "block.modes.palpate", progress=False)
+    motions = [SimpleNamespace(basis=b, scheme=1, exact=True, coupling=None) for b in (basis, basis.first(3))]
+    assert runs._motion_of(motions[0]) != runs._motion_of(motions[1])
 
 
 @pytest.mark.parametrize("change", ["depth", "tool", "grid"])

@@ -110,3 +110,33 @@ def test_no_strike_of_a_tick_is_lost(moving, tmp_path):
     assert strikes == [f"strike of {(1 + step) * 1e-4} N s on body 0" for step in range(6)]
     replayed = palpate.replay(recording, scene=moving)
     assert not replayed.differences
+
+
+class CountedDevice(palpate.Device):
+    """A device of a program that counts how often it is opened."""
+
+    def __init__(self):
+        self.opened = 0
+
+    def open(self):
+        self.opened += 1
+        time.sleep(0.05)
+
+    def read(self):
+        return palpate.Reading((0.0, 0.0, 1.0))
+
+    def write(self, force, torque):
+        pass
+
+
+def test_two_threads_that_start_a_loop_start_it_once(block, block_green):
+    built = BuiltScene.of(palpate.Scene(body={"model": "beam"}, tool={"radius": "5mm"}), block, block_green)
+    device = CountedDevice()
+    simulation = palpate.Simulation(built, devices={0: device})
+    threads = [threading.Thread(target=simulation.start) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    simulation.stop()
+    assert device.opened == 1

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet
 import pytest
+import trimesh
 from command_line import refused, run
 from conftest import box_mesh
 from direct import patch_at, solve_with_patches
@@ -221,3 +222,65 @@ def test_the_file_of_the_page_can_be_read(tmp_path):
     assert [case.name for case in study.cases] == ["first"] * 9 + ["second"] * 9
     assert study.cases[9].scene.presses[0].point == (0.038, 0.02, 0.047)
     assert study.cases[9].scene.bodies[0].mesh == "second.stl"
+
+
+def forces_alone(folder, text, *moduli):
+    """Force of the first press of each body by the scene alone."""
+    found = []
+    for modulus in moduli:
+        own = text.replace("MODULUS", modulus).split("[[press]]")[0]
+        scene = palpate.Scene.read(written(folder, own, "alone.toml"))
+        green = scene.build(progress=False).bodies[0].green
+        found.append(np.linalg.norm(green.touch((0.04, 0.025, 0.05), (0, 1e-3, -2e-3), 0.012).force))
+    return found
+
+
+@pytest.mark.parametrize("what", ["constants of a region", "constants of the material"])
+def test_a_modulus_that_does_not_scale_all_is_solved_each_time(folder, operators, what):
+    body = BASE.replace('"10kPa"', '"MODULUS"')
+    if what == "constants of a region":
+        region = REGION + 'law = "yeoh"\nc10 = "6kPa"\n'
+        body, grid = body.replace("[[press]]", region + "[[press]]", 1), "material.youngs_modulus"
+    else:
+        constants = 'law = "yeoh"\nc10 = "MODULUS"\n'
+        body, grid = body.replace('youngs_modulus = "MODULUS"\n', constants), "material.c10"
+    values = ("2kPa", "8kPa")
+    text = body.replace("MODULUS", values[0]) + f"[grid]\n{grid} = {list(values)}\n"
+    columns = Study.read(written(folder, text)).run(folder / "out", progress=False).columns
+    assert np.allclose(columns["force_N"][::2], forces_alone(folder, body, *values), rtol=1e-4)
+    assert len(operators) == 2
+
+
+def test_parts_of_a_surface_are_bodies_of_their_own(folder):
+    parts = [trimesh.creation.icosphere(2, 20.0), trimesh.creation.icosphere(2, 12.0)]
+    parts[1].apply_translation([60.0, 0.0, 0.0])
+    trimesh.util.concatenate(parts).export(folder / "two.stl")
+    mesh = 'mesh = "two.stl"\nunit = "mm"\nmax_element_size = "8mm"'
+    press = '[[press]]\npoint = ["60mm", 0, "12mm"]\ndisplacement = ["-", "-", "-1mm"]\nradius = "3mm"\n'
+    cases = "".join(f"[[case]]\nbody.part = {part}\n" for part in (1, 2))
+    text = BASE.replace('mesh = "box.vtu"', mesh).split("[[press]]")[0] + press + cases
+    result = Study.read(written(folder, text)).run(folder / "out", progress=False)
+    # The press meets the second part alone.
+    assert list(result.problems) == [1]
+    assert result.columns["volume_m3"][1] == pytest.approx(4 / 3 * np.pi * 0.012**3, rel=0.1)
+
+
+def test_nodes_of_a_file_that_is_edited_are_solved_again(folder):
+    mesh = palpate.TetMesh.read(folder / "box.vtu")
+    held = np.flatnonzero(mesh.nodes[:, 2] < 1e-3)
+    text = BASE.replace('"z < min + 1mm"', '"held.nodes"') + '[grid]\nmaterial.youngs_modulus = ["2kPa"]\n'
+    forces = []
+    for nodes in (held, held[: len(held) // 2]):
+        (folder / "held.nodes").write_text(" ".join(map(str, nodes)))
+        result = Study.read(written(folder, text)).run(folder / "out", progress=False)
+        assert result.resumed == 0
+        forces.append(result.columns["force_N"][0])
+    assert forces[1] < 0.95 * forces[0]
+
+
+def test_a_line_of_answers_that_is_none_is_left_out(folder):
+    path, out = written(folder, BASE), folder / "out"
+    Study.read(path).run(out, progress=False)
+    with (out / "finished.jsonl").open("ab") as kept:
+        kept.write(b"[1, 2]\n7\n")
+    assert Study.read(path).run(out, progress=False).resumed == 1

@@ -44,6 +44,8 @@ export class Viewport {
     // One finger presses wherever it meets a body, so two must do for all of the rest, but for moving: three do that.
     this.controls.touches = { ONE: THREE.TOUCH.ROTATE, TWO: THREE.TOUCH.DOLLY_ROTATE };
     this.controls.addEventListener("change", () => this.changeView());
+    // A driver may take the context away and give it back; what it showed is gone.
+    canvas.addEventListener("webglcontextrestored", () => this.invalidate());
     new ResizeObserver(() => this.resize()).observe(canvas.parentElement!);
     this.resize();
     this.renderer.setAnimationLoop(() => this.tick());

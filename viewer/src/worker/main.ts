@@ -11,6 +11,8 @@ const WAKE_MS = 1;
 let module: Promise<WebAssembly.Module> | null = null;
 let program: Program | null = null;
 let session: WorkerSession | null = null;
+/** How often a scene was asked for. */
+let asked = 0;
 
 function post(message: FromWorker, transfer: Transferable[] = []): void {
   self.postMessage(message, { transfer });
@@ -22,11 +24,13 @@ async function compiled(url: string): Promise<WebAssembly.Module> {
   return WebAssembly.compile(await answer.arrayBuffer());
 }
 
-/** Replaces the running scene by another, once that is loaded. */
+/** Replaces the running scene by another, once that is loaded, unless yet another was chosen meanwhile. */
 async function open({ program: programUrl, url, name, models }: OpenScene): Promise<void> {
+  const own = ++asked;
   module ??= compiled(programUrl);
   const [code, scene] = await Promise.all([module, fetchPackage(url)]);
   const next = await Program.load(code, () => performance.now());
+  if (own !== asked) return;
   for (const [file, bytes] of scene.files) next.provide(file, bytes);
   scene.files.clear();
   next.open();
@@ -66,12 +70,13 @@ function say(message: object): void {
 async function change(scene: OpenScene): Promise<void> {
   const status = (text: string) => say({ type: "status", text, progress: null, left_s: null });
   status(`Loading ${scene.name}`);
+  const own = asked + 1;
   try {
     await open(scene);
   } catch (error) {
     say({ type: "error", text: reasonOf(error) });
   }
-  status("");
+  if (own === asked) status("");
 }
 
 self.onmessage = (event: MessageEvent<ToWorker>): void => {
