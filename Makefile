@@ -85,12 +85,14 @@ demo: $(VENV)/.installed $(PAGE)
 # each of them takes on, and in which order.
 # OpenBLAS on one thread each: its threads wait for one another by spinning, which took two thirds of the tests of modes.
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --quiet --numprocesses 2 --dist loadgroup --no-loadscope-reorder
+# No documentation of a crate holds tests, and looking for them takes rustdoc 8 s.
+CARGO_TEST := cargo test --release --quiet --workspace --lib --bins --tests
 test: | check-tools
 	@# npm and pip wait for downloads while cargo compiles.
-	cargo test --release --quiet --workspace --no-run & \
+	$(CARGO_TEST) --no-run & \
 		$(MAKE) --no-print-directory $(PAGE) $(WEB) viewer/node_modules/.checks $(VENV)/.installed; status=$$?; \
 		wait $$! && exit $$status
-	cargo test --release --quiet --workspace
+	$(CARGO_TEST)
 	cd viewer && npm run --silent check
 	$(PYTEST) -m "not slow" $(ARGS)
 

@@ -52,8 +52,8 @@ class Link:
 
     def __init__(self, simulation: Callable[[], Simulation | None], axes: Axes | None = None, folder: Path = Path()):
         self._simulation, self.axes, self._folder = simulation, axes or Axes(), folder
-        # Who moves each tool, and when it was last moved.
-        self._movers: dict[int, tuple[object, float]] = {}
+        # Who moves each tool, when it was last moved, and how often by then.
+        self._movers: dict[int, tuple[object, float, int]] = {}
 
     def take(self, peer: object, message: Message, now: float) -> bytes | None:
         """Do what a message says; an answer for its peer alone, or None. What Palpate does not know is left alone.
@@ -76,7 +76,7 @@ class Link:
         return None
 
     def _move(self, simulation: Simulation, tool: int, matrix: np.ndarray, peer: object, now: float) -> None:
-        mover, since = self._movers.get(tool, (peer, now))
+        mover, since, _ = self._movers.get(tool, (peer, now, 0))
         if mover is not peer and now - since < SILENCE:
             return
         position, orientation = self.axes.pose_from_wire(matrix)
@@ -84,7 +84,7 @@ class Link:
             simulation.move(position, tool=tool, orientation=orientation)
         except Error as error:
             raise MessageError(str(error)) from None
-        self._movers[tool] = (peer, now)
+        self._movers[tool] = (peer, now, simulation._moves[tool])
 
     def _command(self, simulation: Simulation | None, text: str) -> str:
         if simulation is None:
@@ -117,18 +117,19 @@ class Link:
 
     def let_go(self, peer: object) -> None:
         """Take the tools of a disconnected peer out of the scene."""
-        for tool in [tool for tool, (mover, _) in self._movers.items() if mover is peer]:
+        for tool in [tool for tool, (mover, *_) in self._movers.items() if mover is peer]:
             self._remove(tool)
 
     def let_go_of_silent(self, now: float) -> None:
         """Take tools out of the scene whose peer has been silent for too long."""
-        for tool in [tool for tool, (_, since) in self._movers.items() if now - since > SILENCE]:
+        for tool in [tool for tool, (_, since, _) in self._movers.items() if now - since > SILENCE]:
             self._remove(tool)
 
     def _remove(self, tool: int) -> None:
-        del self._movers[tool]
+        *_, moves = self._movers.pop(tool)
         simulation = self._simulation()
-        if simulation is not None and tool < len(simulation.scene.tools):
+        # Whoever has moved it since, such as the page, holds it now.
+        if simulation is not None and tool < len(simulation.scene.tools) and simulation._moves[tool] == moves:
             simulation.remove(tool)
 
     def state(self) -> bytes | None:

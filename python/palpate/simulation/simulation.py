@@ -8,6 +8,7 @@ import threading
 import time
 import warnings
 import weakref
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -111,6 +112,8 @@ class Simulation(Adjustable, SeriesGrowth, SceneEditing):
         self._devices: dict[int, str] = {}
         self._armed, self._running, self._warned, self._warned_of_error = False, False, False, False
         self._number: int | None = 0
+        # How often each tool was moved, by whomever.
+        self._moves: Counter[int] = Counter()
         self._editing = threading.RLock()
         self._to_record: Path | None = None
 
@@ -269,6 +272,7 @@ class Simulation(Adjustable, SeriesGrowth, SceneEditing):
         if orientation is not None:
             turned = orientations_of([orientation], np.array([[place]]))[0, 0].tolist()
         self._core.set_target(self._tool(tool), (place, turned), moving, True, None)
+        self._moves[tool] += 1
 
     def grab(self, on: bool, tool: int = 0) -> None:
         """Grab the surface near the tool, or let go."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import errno
 import gc
 import secrets
@@ -322,21 +321,20 @@ class ViewerServer(SessionHost):
 
     async def _send_frames(self, client: Client) -> None:
         """Send the latest frame whenever the client has drawn the one before; nothing is ever queued."""
-        with contextlib.suppress(ConnectionClosed):
-            while True:
-                await client.may_send.wait()
-                client.may_send.clear()
-                session = self._session
-                try:
-                    await self._send_next(client, session)
-                except Exception as error:
-                    # Another session may have taken the place of this one meanwhile.
-                    if session is self._session:
-                        if client.refused is not session:
-                            client.refused = session
-                            client.send(error_message(error))
-                        await asyncio.sleep(STOPPED_PAUSE)
-                    client.may_send.set()
+        while True:
+            await client.may_send.wait()
+            client.may_send.clear()
+            session = self._session
+            try:
+                await self._send_next(client, session)
+            except Exception as error:
+                # Another session may have taken the place of this one meanwhile.
+                if session is self._session:
+                    if client.refused is not session:
+                        client.refused = session
+                        client.send(error_message(error))
+                    await asyncio.sleep(STOPPED_PAUSE)
+                client.may_send.set()
 
     async def _send_next(self, client: Client, session: Session | SetupSession) -> None:
         """Send the scene of a session, or a frame of it."""

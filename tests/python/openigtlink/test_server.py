@@ -13,7 +13,7 @@ import pytest
 
 import palpate
 from palpate.openigtlink import Axes, Link, LinkServer
-from palpate.openigtlink.messages import HEADER, pack, string_content, transform_content
+from palpate.openigtlink.messages import HEADER, Message, pack, string_content, transform_content
 from palpate.openigtlink.peer import PATIENCE
 from palpate.scene import BuiltScene
 
@@ -98,7 +98,6 @@ def test_a_silent_client_lets_go(server, simulation):
 
 def test_only_one_client_moves_a_tool_at_a_time(simulation, tmp_path):
     link, now = Link(lambda: simulation, folder=tmp_path), 10.0
-    from palpate.openigtlink.messages import Message
 
     def move(peer, depth, at):
         link.take(peer, Message("TRANSFORM", "Tool", transform_content(pose(depth))), at)
@@ -112,8 +111,20 @@ def test_only_one_client_moves_a_tool_at_a_time(simulation, tmp_path):
     until(lambda: simulation.frame().positions[0][2] > 0.07)
 
 
+def test_a_peer_that_falls_silent_leaves_the_tool_to_whoever_moved_it_since(simulation, tmp_path):
+    link, content = Link(lambda: simulation, folder=tmp_path), transform_content(pose(-0.01))
+    link.take("peer", Message("TRANSFORM", "Tool", content), 10.0)
+    simulation.move((0.04, 0.025, 0.055))
+    link.let_go_of_silent(20.0)
+    time.sleep(0.2)
+    assert simulation.frame().active[0]
+    # What nobody has moved since leaves with its peer.
+    link.take("peer", Message("TRANSFORM", "Tool", content), 30.0)
+    link.let_go_of_silent(40.0)
+    until(lambda: not simulation.frame().active[0])
+
+
 def test_the_scene_may_stand_elsewhere_in_the_world_of_the_wire(simulation, tmp_path):
-    from palpate.openigtlink.messages import Message
 
     link = Link(lambda: simulation, Axes("LPS"), tmp_path)
     placement = np.array([[0.0, -1.0, 0.0, 100.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 20.0], [0, 0, 0, 1.0]])
