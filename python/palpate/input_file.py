@@ -43,7 +43,7 @@ def read_toml(path: Path, error: type[Error]) -> tuple[str, dict[str, Any]]:
 
     """
     require_file(path, error)
-    text = path.read_text(errors="replace")
+    text = path.read_text(encoding="utf-8", errors="replace")
     try:
         return text, tomllib.loads(text)
     except tomllib.TOMLDecodeError as mistake:

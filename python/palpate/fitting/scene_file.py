@@ -20,7 +20,7 @@ def write_fitted(text: str, changes: Sequence[tuple[Slot, dict[str, float]]], pa
         for name, value in values.items():
             table[name] = round(value, 6) if name == "poissons_ratio" else _pressure(value)
     with written_beside(path) as partial:
-        partial.write_text(tomlkit.dumps(document))
+        partial.write_text(tomlkit.dumps(document), encoding="utf-8")
 
 
 def _table_of(document: Any, slot: Slot) -> Any:

@@ -209,7 +209,7 @@ def _regions(mesh: meshio.Mesh, blocks: list[int]) -> tuple[np.ndarray, dict[str
 
 def _read_netgen(path: Path) -> Volume:
     """Read the ``points`` and ``volumeelements`` sections of a Netgen mesh (1-based, negatively oriented)."""
-    lines = path.read_text(errors="replace").splitlines()
+    lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
     heads = {line.strip(): i for i, line in enumerate(lines) if line.strip() in {"points", "volumeelements"}}
     if len(heads) != 2:
         raise MeshError(f"{path}: holds no points and volume elements of a Netgen mesh")

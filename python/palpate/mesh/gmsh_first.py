@@ -42,7 +42,7 @@ def read_first_format(path: Path) -> meshio.Mesh:
     """
     import meshio
 
-    lines = enumerate(path.read_text(errors="replace").splitlines(), 1)
+    lines = enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), 1)
     try:
         nodes = [(int(words[0]), [float(x) for x in words[1:4]]) for words in _section(lines, "$NOD")]
         rank = {number: row for row, (number, _) in enumerate(nodes)}

@@ -79,7 +79,7 @@ def write_curves(found: MapRecord, path: Path) -> None:
     """Write a row for each tick of each curve, with the number of its point or stroke."""
     of = "stroke" if (found.strokes >= 0).any() else "point"
     names = (of, "time_s", "position_m", "depth_m", "normal_force_N", "fx_N", "fy_N", "fz_N", "limited")
-    with written_beside(path) as partial, partial.open("w") as stream:
+    with written_beside(path) as partial, partial.open("w", encoding="utf-8") as stream:
         stream.write(",".join(names) + "\n")
         for rank, curve in enumerate(found.curves):
             count = np.full(len(curve.time), rank)
@@ -118,7 +118,7 @@ def _surface_mesh(found: MapRecord, values: Mapping[str, np.ndarray]) -> meshio.
 
 
 def _write_rows(path: Path, names: Iterable[str], rows: Iterable[Sequence[Any]]) -> None:
-    with written_beside(path) as partial, partial.open("w", newline="") as stream:
+    with written_beside(path) as partial, partial.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(names)
         writer.writerows([_text(value) for value in row] for row in rows)

@@ -32,7 +32,7 @@ def read_nodes(path: Path) -> list[int]:
     """
     require_file(path, SceneError)
     numbers: list[int] = []
-    for rank, line in enumerate(path.read_text(errors="replace").splitlines()):
+    for rank, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines()):
         for word in line.partition("#")[0].split():
             if not (word.isascii() and word.isdigit()):
                 raise SceneError(f"{path}:{rank + 1}: '{word[:40]}' is no node number")
@@ -47,4 +47,4 @@ def write_nodes(path: Path, nodes: Iterable[int], comment: str) -> None:
     numbers = np.unique(np.fromiter(nodes, dtype=np.int64)).tolist()
     lines = [" ".join(map(str, numbers[at : at + IN_LINE])) for at in range(0, len(numbers), IN_LINE)]
     with written_beside(path) as partial:
-        partial.write_text("\n".join([f"# {comment}", *lines, ""]))
+        partial.write_text("\n".join([f"# {comment}", *lines, ""]), encoding="utf-8")

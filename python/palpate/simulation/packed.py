@@ -54,7 +54,7 @@ def pack(scene: Scene | BuiltScene, path: str | os.PathLike[str], inside: bool =
     with folder_beside(where) as folder:
         description = describe(built, folder, inside)
         text = json.dumps(description, indent=2, allow_nan=False)
-        (folder / SCENE_FILE).write_text(text + "\n")
+        (folder / SCENE_FILE).write_text(text + "\n", encoding="utf-8")
 
 
 def _require_replaceable(path: Path) -> None:

@@ -197,7 +197,7 @@ class SetupBody:
         if choices.friction is not None:
             tables["tool"]["friction"] = choices.friction
         path = folder / f"{name}.toml"
-        path.write_text(scene_text(tables, comments))
+        path.write_text(scene_text(tables, comments), encoding="utf-8")
         return path
 
     def scene(self) -> Scene:
