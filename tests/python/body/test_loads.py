@@ -10,9 +10,6 @@ import palpate
 from palpate.fields import Interior
 from palpate.mesh.shape_functions import surface_integrals
 
-# Large loads, whose answers are compared with linear ones.
-pytestmark = pytest.mark.filterwarnings("ignore:the body's own loads:palpate.TouchWarning")
-
 SIZE = np.array([0.08, 0.05, 0.05])
 DENSITY = 1100.0
 LOADS = palpate.Loads(

@@ -15,9 +15,6 @@ from palpate.body import description, problem_arrays
 from palpate.green import gathering
 from palpate.green.bounds import CHOSEN
 
-# A jelly that sags by more than linear elasticity can answer.
-pytestmark = pytest.mark.filterwarnings("ignore:the body's own loads:palpate.TouchWarning")
-
 
 @pytest.fixture(scope="module")
 def body():
