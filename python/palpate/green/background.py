@@ -93,7 +93,7 @@ class BackgroundPrecompute:
         try:
             self._take_messages(lines)
         except Exception as error:
-            # Whoever waits must not wait for ever: a message cut short, a store that cannot be deleted.
+            # Such as a message that is cut short. Without an error, wait() would never return.
             self._finish(f"{type(error).__name__}: {error}")
         self._finish("the process that computes the columns has ended")
 

@@ -2,8 +2,8 @@
 
 The route ``remesh`` makes a new surface of even triangles and fills it; ``keep`` fills the surface exactly as given.
 
-Exit status 1: no tetrahedra; 3: files that cannot be written, for which another route is no remedy. Anything the mesher
-does to this process hurts nobody else.
+Exit status 1: no tetrahedra; 3: files that cannot be written, for which another route is no remedy. A crash of
+the mesher ends this process alone.
 """
 
 from __future__ import annotations

@@ -128,7 +128,7 @@ class Link:
     def _remove(self, tool: int) -> None:
         *_, moves = self._movers.pop(tool)
         simulation = self._simulation()
-        # Whoever has moved it since, such as the page, holds it now.
+        # A tool that the page has moved since then stays in the scene.
         if simulation is not None and tool < len(simulation.scene.tools) and simulation._moves[tool] == moves:
             simulation.remove(tool)
 

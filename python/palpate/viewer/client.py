@@ -28,7 +28,7 @@ class Client:
 
     connection: ServerConnection
     shown: Session | SetupSession | None = None
-    # The session of which it got the message that its frames fail.
+    # The session whose frames failed, once the page has the error message.
     refused: Session | SetupSession | None = None
     wants: ClientView = field(default_factory=ClientView)
     sent: int = 0
@@ -36,7 +36,7 @@ class Client:
     may_send: asyncio.Event = field(default_factory=asyncio.Event)
     last_message: float = field(default_factory=time.monotonic)
     allowance: float = MAX_RATE
-    # What is to be written, with the future of whoever waits until it is.
+    # Messages to be written; the future of one, if it has one, is set when it is written.
     _outgoing: asyncio.Queue[tuple[str | bytes, asyncio.Future[None] | None]] = field(default_factory=asyncio.Queue)
 
     def send(self, message: dict[str, Any]) -> None:

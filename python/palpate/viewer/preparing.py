@@ -13,6 +13,7 @@ from palpate.errors import Error
 from palpate.green import BackgroundPrecompute
 from palpate.progress import Reporter
 from palpate.scene import BuiltScene
+from palpate.viewer.computing import Computing
 from palpate.viewer.server import ViewerServer
 from palpate.viewer.setup_session import SetupSession, ShownSurface
 from palpate.viewer.status import error_message
@@ -81,7 +82,8 @@ async def prepare(server: ViewerServer, preparation: Preparation) -> None:
         drawn.append(asyncio.run_coroutine_threadsafe(show(vertices, triangles), loop))
 
     try:
-        prepared = await building.run(lambda: preparation.build(reporter, draw), _close)
+        end = lambda prepared: Computing(prepared.growing).close()  # noqa: E731
+        prepared = await building.run(lambda: preparation.build(reporter, draw), end)
         for future in drawn:
             await asyncio.wrap_future(future)
         session = await server.call(server.first_session, prepared.built, prepared.maps, prepared.growing)
@@ -94,8 +96,3 @@ async def prepare(server: ViewerServer, preparation: Preparation) -> None:
     finally:
         building.cancel()
         server.finish_building()
-
-
-def _close(prepared: Prepared) -> None:
-    for background in prepared.growing.values():
-        background.close()

@@ -42,7 +42,7 @@ MAX_CLIENTS = 16
 HELLO_TIMEOUT = 5.0
 # A controller that says nothing for this long, not even that it drew a frame, is lost: its contact is released, s.
 LOST_AFTER = 2.0
-# Between two looks at a session whose frames fail, and at what nobody asks for: a lost page, columns that are ready, s.
+# Before a frame that failed is tried again, and between two checks for a lost page and for finished columns, s.
 STOPPED_PAUSE = LOOK_PAUSE = 0.25
 # How long the server waits for connections to close before it ends them, s.
 CLOSE_PATIENCE = 3.0
@@ -363,7 +363,7 @@ class ViewerServer(SessionHost):
         self.send_control({"type": "role", "role": "control"})
 
     async def _watch(self, look: Callable[[], Awaitable[None]]) -> None:
-        """Look again and again. What goes wrong is logged once, and looked at again: nobody awaits a watch."""
+        """Check again and again. An error is logged once and does not end the checks: nothing awaits this task."""
         reported = ""
         while True:
             await asyncio.sleep(LOOK_PAUSE)
@@ -422,7 +422,7 @@ class ViewerServer(SessionHost):
         session.press_on(pressed)
 
     async def send_setup(self) -> None:
-        """Tell pages whether files may be brought, and what is set up."""
+        """Send pages whether they may bring files, and the body that is set up."""
         self.send_all(await self.call(self._setting_up.message))
 
 

@@ -86,7 +86,7 @@ class SessionHost:
         return await self._worker.call(lambda: work(self._session))
 
     def exchange(self, session: Shown) -> None:
-        """Put a session in the place of the one that runs, which goes on where the other does not start.
+        """Put a session in the place of the one that runs. If it does not start, the one before runs again.
 
         On the worker's thread. The old loop ends first: two at real-time priority would keep each other from their
         deadlines. A recording of it ends, and pages get the message about that.
@@ -213,5 +213,4 @@ class SessionHost:
 def discard(session: Shown) -> None:
     """End a session that is not shown, and what is computed beside it."""
     session.close()
-    for background in session.growing.values():
-        background.close()
+    Computing(session.growing).close()

@@ -149,7 +149,7 @@ def test_mesher_that_hangs_or_crashes_is_reported(tmp_path, monkeypatch):
 
 
 def test_a_full_temporary_folder_is_no_reason_for_another_mesh(tmp_path, monkeypatch):
-    """The surface as given would be filled instead, with elements of another size, and nobody would see it."""
+    """Filling the surface as given instead would make elements of another size, without a message."""
     fake = tmp_path / "fake.sh"
     fake.write_text(f'#!/bin/sh\n[ "$3" = remesh ] && exit 3\nexec {sys.executable} "$@"\n')
     fake.chmod(0o755)

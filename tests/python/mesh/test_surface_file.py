@@ -134,7 +134,7 @@ SPHERE = {
     ],
 )
 def test_files_cut_short_are_refused(tmp_path, name, words):
-    """Of a file that is taken as it is filling would close the hole, and nobody would see that something is missing."""
+    """Filling would close the hole without a message."""
     (tmp_path / name).write_bytes(SPHERE[name])
     assert len(load_surface(tmp_path / name).shape.faces) == 320
     kept = SPHERE[name][:-400]

@@ -118,7 +118,7 @@ def test_a_peer_that_falls_silent_leaves_the_tool_to_whoever_moved_it_since(simu
     link.let_go_of_silent(20.0)
     time.sleep(0.2)
     assert simulation.frame().active[0]
-    # What nobody has moved since leaves with its peer.
+    # A tool that was not moved since then leaves the scene.
     link.take("peer", Message("TRANSFORM", "Tool", content), 30.0)
     link.let_go_of_silent(40.0)
     until(lambda: not simulation.frame().active[0])

@@ -387,7 +387,7 @@ def test_a_full_disk_is_a_message_and_parts_given_up_leave_nothing(saves, monkey
             await client.say(type="upload", name="a.stl", size=10)
             error, _ = await client.receive("error")
             assert "No space left on device" in error["text"]
-            # A mistake of the program is answered too, and the connection goes on.
+            # A mistake of the program gets an answer too, and the page stays connected.
             monkeypatch.setattr(setting_up, "Upload", lambda *_: 1 / 0)
             await client.say(type="upload", name="a.stl", size=10)
             error, _ = await client.receive("error")
