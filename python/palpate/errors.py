@@ -68,6 +68,12 @@ class ClusterError(Error):
     """Workers that cannot be reached or used, or a computation that they did not finish."""
 
 
+def system_text(error: OSError) -> str:
+    """Message of an error of the operating system, with its file where it has one."""
+    where = f"{error.filename}: " if error.filename else ""
+    return f"{where}{error.strerror or error}"
+
+
 class PalpateWarning(UserWarning):
     """Base of everything Palpate warns of: the answer stands, but not as well as asked."""
 

@@ -66,7 +66,7 @@ def main() -> None:
 
 def run_commands(commands: typer.Typer) -> None:
     """Run commands; a user's mistake is one line and exit code 2, Ctrl-C is 130, SIGTERM 143."""
-    from palpate.errors import Error, MeshWarning, StoreWarning
+    from palpate.errors import Error, MeshWarning, StoreWarning, system_text
 
     def show(message: Warning | str, category: type[Warning], *_args: object, **_kwargs: object) -> None:
         label = "note" if issubclass(category, (MeshWarning, StoreWarning)) else "warning"
@@ -80,8 +80,7 @@ def run_commands(commands: typer.Typer) -> None:
     except Error as error:
         sys.exit(_print_error(str(error)))
     except OSError as error:
-        where = f"{error.filename}: " if error.filename else ""
-        sys.exit(_print_error(f"{where}{error.strerror or error}"))
+        sys.exit(_print_error(system_text(error)))
     except (KeyboardInterrupt, SystemExit) as ending:
         # Within a command Typer has made exit code 130 of Ctrl-C, without a message.
         if isinstance(ending, SystemExit) and ending.code != INTERRUPTED:

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from palpate.errors import Error
+from palpate.errors import Error, system_text
 from palpate.mesh.tetrahedralize import STAGES
 from palpate.progress import Reporter
 from palpate.viewer.background import CancellableTask
@@ -26,7 +26,7 @@ def error_message(error: BaseException) -> dict[str, Any]:
     if isinstance(error, Error):
         text = str(error)
     elif isinstance(error, OSError) and error.strerror:
-        text = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+        text = system_text(error)
     else:
         text = f"a mistake within palpate, please report it: {error!r}"
         LOG.error("a mistake within palpate", exc_info=error)
