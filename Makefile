@@ -85,8 +85,8 @@ demo: $(VENV)/.installed $(PAGE)
 # each of them takes on, and in which order.
 # OpenBLAS on one thread each: its threads wait for one another by spinning, which took two thirds of the tests of modes.
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --quiet --numprocesses 2 --dist loadgroup --no-loadscope-reorder
-# No documentation of a crate holds tests, and looking for them takes rustdoc 8 s.
-CARGO_TEST := cargo test --release --quiet --workspace --lib --bins --tests
+# --tests leaves out documentation, which holds none; --lib would build crates of which nothing is tested so.
+CARGO_TEST := cargo test --release --quiet --workspace --tests
 test: | check-tools
 	@# npm and pip wait for downloads while cargo compiles.
 	$(CARGO_TEST) --no-run & \

@@ -21,6 +21,7 @@ def pytest_addoption(parser):
         "--no-skips", action="store_true", help="a skipped test is a failure, as on a machine with all tools"
     )
     parser.addoption("--whole", action="store_true", help="campaigns with all of their cases, for about an hour")
+    parser.addoption("--part", default="0/1", help="of the files with slow tests, those of part K of N: K/N, K from 0 on")
 
 
 def pytest_configure(config):
@@ -65,16 +66,32 @@ def pytest_runtest_setup(item):
         shared.close()
 
 
+def mark_slow_cases(items) -> None:
+    """Mark as slow all but one in ``every`` cases of a test with the marker ``quick(every)``, evenly spread."""
+    seen = {}
+    for item in items:
+        marker = item.get_closest_marker("quick")
+        if marker is not None and not item.get_closest_marker("slow"):
+            rank = seen[item.function] = seen.get(item.function, -1) + 1
+            if rank % marker.args[0]:
+                item.add_marker("slow")
+
+
 def thin_campaigns(config, items) -> None:
-    """Deselect all but one in ``every`` slow cases of a test with the marker ``campaign(every)``, evenly spread."""
-    if config.getoption("--whole"):
-        return
+    """Deselect all but one in ``every`` slow cases of a test with the marker ``campaign(every)``, evenly spread, and
+    slow tests of files that are not of the wanted part.
+    """
+    part, parts = map(int, config.getoption("--part").split("/"))
+    files = sorted({item.path for item in items if item.get_closest_marker("slow")})
+    others = {path for place, path in enumerate(files) if place % parts != part}
     seen, deselected, selected = {}, [], []
     for item in items:
         marker = item.get_closest_marker("campaign")
-        thinned = marker is not None and item.get_closest_marker("slow")
+        slow = item.get_closest_marker("slow") is not None
+        thinned = marker is not None and slow and not config.getoption("--whole")
         rank = seen[item.function] = seen.get(item.function, -1) + bool(thinned)
-        (deselected if thinned and rank % marker.args[0] else selected).append(item)
+        left_out = (thinned and rank % marker.args[0]) or (slow and item.path in others)
+        (deselected if left_out else selected).append(item)
     items[:] = selected
     config.hook.pytest_deselected(items=deselected)
 
@@ -85,6 +102,7 @@ def pytest_collection_modifyitems(config, items):
 
     The browsers come first and then files with slow tests, so that no worker is left with a long one at the end.
     """
+    mark_slow_cases(items)
     thin_campaigns(config, items)
     slow = {item.path for item in items if item.get_closest_marker("slow")}
 

@@ -45,6 +45,7 @@ def undisturbed(body, tmp_path_factory):
     return palpate.precompute(body, path=tmp_path_factory.mktemp("one") / "a.palpate").path.read_bytes()
 
 
+@pytest.mark.slow
 def test_one_worker_killed_half_way_leaves_the_bits_of_one_machine(workers, body, undisturbed, tmp_path):
     seen, killed = [], []
 
@@ -135,6 +136,7 @@ def held_factors():
     return len(worker._factors.held)
 
 
+@pytest.mark.slow
 def test_what_a_cluster_began_is_finished_by_one_machine(workers, body, undisturbed, tmp_path):
     path, total = tmp_path / "a.palpate", 3 * len(body.mesh.surface_nodes)
     begun = []
@@ -165,6 +167,7 @@ def assert_finished_here(body, path, undisturbed, finished):
     assert os.listdir(path.parent) == ["a.palpate"]
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_is_killed_loses_nothing(body, undisturbed, tmp_path_factory, tmp_path):
     path, begun = tmp_path / "a.palpate", []
     with programs(tmp_path_factory.mktemp("programs")) as (address, scheduler):
@@ -192,6 +195,7 @@ def test_a_lost_connection_is_not_taken_for_a_full_disk(workers, body, tmp_path,
         palpate.precompute(body, path=tmp_path / "a.palpate", dask=workers.scheduler_address)
 
 
+@pytest.mark.slow
 def test_eight_bodies_on_two_workers_answer_what_they_answer_one_by_one(workers, tmp_path):
     box_mesh(cells=(6, 4, 4)).write(tmp_path / "box.vtu")
     (tmp_path / "study.toml").write_text(

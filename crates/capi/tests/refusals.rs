@@ -23,6 +23,7 @@ use palpate::statics::{Condition, palpate_store_solve, palpate_store_touch};
 use palpate::status::Status;
 use palpate::store::{palpate_store_free, palpate_store_get_positions, palpate_store_load};
 use palpate::tick::{DeviceWrench, palpate_loop_tick};
+use palpate::versioned_struct::{VersionedStruct, read, write, write_as};
 
 const ARGUMENT: Status = Status::PalpateErrorArgument;
 
@@ -205,4 +206,67 @@ fn who_ticks_is_one_at_a_time() {
         palpate_store_free(store);
     }
     std::fs::remove_file(path).expect("the store");
+}
+
+/// A struct of two numbers that has grown by a third one.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct NewerStruct {
+    struct_size: u32,
+    first: u32,
+    second: f64,
+    added: f64,
+}
+
+impl Default for NewerStruct {
+    fn default() -> Self {
+        Self { struct_size: size_of::<Self>() as u32, first: 1, second: 2.0, added: 3.0 }
+    }
+}
+
+// SAFETY: numbers only; the size comes first.
+unsafe impl VersionedStruct for NewerStruct {
+    const NAME: &str = "grown";
+    const FIRST_SIZE: usize = 16;
+}
+
+/// What an older program has, and memory behind it that is not the struct's.
+#[repr(C)]
+struct OlderStruct {
+    struct_size: u32,
+    first: u32,
+    second: f64,
+    behind: f64,
+}
+
+#[test]
+fn an_older_struct_is_read_and_filled_as_far_as_it_reaches() {
+    let mut older = OlderStruct { struct_size: 16, first: 7, second: 8.0, behind: 9.0 };
+    // SAFETY: 16 bytes are there.
+    let read = unsafe { read((&raw const older).cast::<NewerStruct>()) }.expect("an older struct");
+    assert_eq!(read, NewerStruct { struct_size: 16, first: 7, second: 8.0, added: 3.0 });
+    let answer = NewerStruct { first: 4, second: 5.0, added: 6.0, ..NewerStruct::default() };
+    // SAFETY: 16 bytes are there.
+    unsafe { write(&answer, (&raw mut older).cast::<NewerStruct>()) }.expect("an older struct");
+    assert_eq!((older.struct_size, older.first, older.second, older.behind), (16, 4, 5.0, 9.0));
+    // SAFETY: 16 bytes are there.
+    unsafe { write_as(&NewerStruct::default(), (&raw mut older).cast::<NewerStruct>(), 16) }
+        .expect("an older struct");
+    assert_eq!((older.struct_size, older.first, older.second, older.behind), (16, 1, 2.0, 9.0));
+}
+
+#[test]
+fn a_newer_struct_and_none_at_all_are_refused() {
+    for (size, words) in [(32, "newer palpate.h"), (15, "set it to sizeof(grown)"), (0, "sizeof(grown)")] {
+        let mut stated_size = NewerStruct { struct_size: size, ..NewerStruct::default() };
+        // SAFETY: refused by its size alone.
+        let refusals = unsafe {
+            [read(&raw const stated_size).err(), write(&NewerStruct::default(), &raw mut stated_size).err()]
+        };
+        for refusal in refusals {
+            let refusal = refusal.expect("refused");
+            assert_eq!(refusal.status, Status::PalpateErrorArgument);
+            assert!(refusal.message.contains(words), "{}", refusal.message);
+        }
+    }
 }

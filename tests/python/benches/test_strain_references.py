@@ -83,6 +83,7 @@ def loaded(body: Cylinder, load: np.ndarray, steps: int = 6) -> np.ndarray:
     return u
 
 
+@pytest.mark.slow
 @needs_ccx
 def test_an_axisymmetric_body_under_a_patch_load_is_that_of_calculix(tmp_path):
     body = cylinder()
@@ -96,6 +97,7 @@ def test_an_axisymmetric_body_under_a_patch_load_is_that_of_calculix(tmp_path):
     assert means[1] == pytest.approx(means[0], rel=ALLOWED)
 
 
+@pytest.mark.slow
 @needs_ccx
 def test_calculix_has_the_contact_of_a_sphere_on_an_axisymmetric_body(tmp_path):
     """Under the forces of the sphere its surface touches the sphere, and nowhere enters it."""

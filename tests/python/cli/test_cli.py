@@ -127,6 +127,7 @@ def test_scripted_press_leaves_a_log_and_a_plot(tmp_path, shared_cache):
     assert "largest strain" in result.stdout and "accurate" not in result.stdout
 
 
+@pytest.mark.slow
 def test_scripted_press_is_limited_or_flagged(tmp_path, shared_cache):
     scene = '[body]\nmodel = "kidney"\npaper = true\n[tool]\ncontact = "patch"\n'
     (tmp_path / "limited.toml").write_text(scene + "[view]\nstrain_limit = 0.1\n")

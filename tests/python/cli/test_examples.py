@@ -40,6 +40,7 @@ def test_example(example, tmp_path, shared_cache):
 CHUNKS = [text.split("```")[0] for text in (ROOT / "docs" / "dynamics.md").read_text().split("```python\n")[1:]]
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize("code", CHUNKS, ids=["scene", "newmark"])
 def test_the_examples_of_the_page_on_motion(code):
     result = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=280)

@@ -89,6 +89,7 @@ def test_files_that_cannot_be(recorded, block, shared_cache, tmp_path):
     assert recorded.read_bytes() == before
 
 
+@pytest.mark.slow
 def test_a_killed_process_loses_a_tenth_of_a_second(block, tmp_path, shared_cache):
     code = (
         "import sys, time, palpate\n"

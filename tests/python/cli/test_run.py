@@ -164,6 +164,7 @@ def test_a_radius_that_covers_too_many_nodes_is_refused_with_the_largest(fine, t
     refused(run(*press, "--radius", "4cm", cwd=tmp_path), "at most", "--radius")
 
 
+@pytest.mark.slow
 def test_a_fine_surface_takes_what_it_can():
     """Of a mesh so fine in its middle that a sixteenth covers too many nodes the radius of patches is what fits."""
     import skfem

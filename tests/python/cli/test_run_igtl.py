@@ -50,6 +50,7 @@ def wait_for_port(port: int, process, folder) -> None:
     raise AssertionError("the port did not open")
 
 
+@pytest.mark.slow
 def test_a_client_of_the_command_feels_the_block(tmp_path, shared_cache):
     port, page = free_port(), free_port()
     with running("--igtl", str(port), "--port", str(page), cwd=tmp_path) as process:

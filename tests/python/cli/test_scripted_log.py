@@ -23,6 +23,7 @@ def read_log(path):
     return np.genfromtxt(path, delimiter=",", names=True)
 
 
+@pytest.mark.slow
 def test_the_log_has_the_depth_and_the_strain_of_every_tick(tmp_path):
     """Of a patch that sticks both are proportional to the force: of one answer of the Green's function, scaled."""
     (tmp_path / "a.toml").write_text(SCENE + "[view]\nstrain_limit = 0\n")
@@ -69,6 +70,7 @@ def test_the_log_is_kept_on_ctrl_c(tmp_path):
     assert 1.0 < log["time_s"][-1] < 20 and len(log) > 500
 
 
+@pytest.mark.slow
 def test_the_depth_in_a_groove_is_that_of_the_wall_that_is_pressed_farther():
     """Between walls at 45 degrees a sphere beside the middle, by s, is as much deeper in one: (d + |s|) / sqrt(2)."""
     down, aside = 1e-3, 0.4e-3

@@ -49,6 +49,7 @@ def test_a_sphere_on_a_corner_feels_what_the_direct_solution_does(loops, name):
     assert np.abs(off).max() <= TOLERANCE[name], np.round(100 * off, 1)
 
 
+@pytest.mark.quick(3)
 @pytest.mark.parametrize("tool", ["sphere", "ellipsoid", "capsule"])
 @pytest.mark.parametrize("name", WAYS)
 def test_a_tool_that_is_driven_into_a_corner_keeps_its_contact(loops, name, tool):
@@ -60,6 +61,7 @@ def test_a_tool_that_is_driven_into_a_corner_keeps_its_contact(loops, name, tool
     assert (size >= LEFT * np.maximum.accumulate(size)).all()
 
 
+@pytest.mark.quick(3)
 @pytest.mark.parametrize("part", [0.25, 0.5, 1.0])
 def test_a_closed_path_over_a_corner_gives_out_no_more_than_was_put_in(loops, part):
     deep, radius = part * RADII["sphere"], RADII["sphere"]

@@ -129,6 +129,7 @@ def ratios(found: dict[str, float]) -> str:
     return ", ".join(f"{name}: {100 * part:+.2f} %" for name, part in found.items())
 
 
+@pytest.mark.quick(3)
 @pytest.mark.parametrize("tool", ["sphere", "small sphere"])
 @pytest.mark.parametrize("part", QUICK_DEPTHS)
 def test_a_torus_gives_out_no_more_than_was_put_in(loops, tool, part):
@@ -137,6 +138,7 @@ def test_a_torus_gives_out_no_more_than_was_put_in(loops, tool, part):
     assert max(found.values()) <= TOLERANCE, ratios(found)
 
 
+@pytest.mark.quick(3)
 @pytest.mark.parametrize("tool", ["sphere", "small sphere"])
 @pytest.mark.parametrize("part", QUICK_DEPTHS)
 def test_a_cups_wall_gives_back_what_was_put_in(loops, tool, part):

@@ -44,6 +44,7 @@ def lost(forces: np.ndarray) -> float:
     return float((np.maximum.accumulate(forces) - forces).max() / forces.max())
 
 
+@pytest.mark.quick(3)
 @pytest.mark.filterwarnings("ignore::palpate.TouchWarning")
 @pytest.mark.parametrize("law", ["linear", "neo-hookean"])
 @pytest.mark.parametrize("node", NODES)

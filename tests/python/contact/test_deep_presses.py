@@ -105,6 +105,7 @@ def press(
 
 
 # A file in a star has several contacts of many cells: minutes beside other tests.
+@pytest.mark.quick(3)
 @pytest.mark.timeout(900)
 @pytest.mark.campaign(3)
 @pytest.mark.parametrize("tool", ["sphere", "capsule", "punch", pytest.param("file", marks=pytest.mark.slow)])

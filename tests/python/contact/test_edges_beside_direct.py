@@ -114,6 +114,7 @@ def within(forces: np.ndarray, direct: np.ndarray, tolerance: float) -> np.ndarr
     return np.abs(forces / direct - 1) <= tolerance
 
 
+@pytest.mark.quick(3)
 @pytest.mark.parametrize("name", POSES)
 def test_a_tool_on_an_edge_feels_what_the_direct_solution_does(block, name):
     rounding, direct = block[0], np.array(DIRECT[block[0]][name])

@@ -216,6 +216,7 @@ def rotations(quaternions: np.ndarray) -> np.ndarray:
     return vector * (2 * np.arctan2(size, w) / np.maximum(size, 1e-300))[:, None]
 
 
+@pytest.mark.quick(3)
 @pytest.mark.parametrize("name", SHAPES)
 def test_closed_paths_with_rotation_give_out_no_energy(block, name):
     tool = SHAPES[name]

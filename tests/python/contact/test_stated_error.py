@@ -13,6 +13,7 @@ ALLOWED = 0.025
 BODIES = {cylinder.name: cylinder for cylinder in references()}
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize(
     "name",
     [

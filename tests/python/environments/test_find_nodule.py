@@ -22,6 +22,7 @@ def test_it_passes_the_check_of_gymnasium():
     check_env(env.unwrapped, skip_render_check=True)
 
 
+@pytest.mark.slow
 def test_a_seed_gives_the_same_episode_and_a_nodule_is_stiffer():
     env = FindNodule(slabs=2, noise=0.0)
     seen = []

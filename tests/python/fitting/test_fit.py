@@ -212,6 +212,7 @@ def test_what_cannot_be_is_refused(block_file):
         palpate.fit(start, far)
 
 
+@pytest.mark.slow
 def test_a_bonded_layer_has_the_modulus_of_a_published_formula(tmp_path):
     """Dimitriadis, Horkay, Maresca, Kachar and Chadwick, Biophys. J. 82 (2002): a ball on a bonded layer."""
     from palpate.environments.slab import SIDES, _mesh

@@ -38,6 +38,7 @@ def test_scratch_that_the_system_does_not_give_is_a_line(what, tmp_path):
     assert result.stdout.count("\n") <= 1
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of addresses are Linux's")
 def test_a_store_that_the_memory_cannot_hold_is_a_line(tmp_path):
     path = str(tmp_path / "a.palpate")

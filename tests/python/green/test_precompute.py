@@ -177,6 +177,7 @@ def test_what_a_killed_process_was_writing_is_removed_by_the_next_one(tmp_path):
     assert sorted(os.listdir(tmp_path)) == sorted(["a.palpate", mine.name, other.name])
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize("kill", [signal.SIGINT, signal.SIGKILL])
 def test_interrupted_precompute_resumes_to_the_same_bits(kill, undisturbed, tmp_path):
     path = tmp_path / "a.palpate"
@@ -258,6 +259,7 @@ def test_partial_of_another_body_is_thrown_away(block, tmp_path):
         path.unlink()
 
 
+@pytest.mark.slow
 def test_damaged_block_of_a_partial_is_computed_again(undisturbed, tmp_path):
     body = palpate.Body(box_mesh(cells=CELLS), material=palpate.Material(1e4, 0.4), fixed=lambda p: p[:, 0] < 1e-9)
     path, partial = tmp_path / "a.palpate", tmp_path / "a.palpate.partial"

@@ -188,6 +188,7 @@ def test_a_partial_with_all_columns_only_has_to_be_written(tmp_path):
     assert operator(other) == operator(path)
 
 
+@pytest.mark.slow
 def test_a_partial_of_other_stages_is_used(tmp_path):
     body = palpate.Body(
         box_mesh(cells=(20, 14, 14)), material=palpate.Material(1e4, 0.4), fixed=lambda p: p[:, 0] < 1e-9

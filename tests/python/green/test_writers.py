@@ -86,6 +86,7 @@ def error_of(path, body, expected) -> float | None:
     return worst
 
 
+@pytest.mark.slow
 def test_of_two_writers_one_computes_and_the_other_waits(body, expected, tmp_path):
     path = tmp_path / "a.palpate"
     race(path, FIRST[:2], (None, None))

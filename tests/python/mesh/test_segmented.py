@@ -173,6 +173,7 @@ def test_mistakes_of_the_command_line_are_one_line(tmp_path):
     refused(run("run", "ct.nii", "--segment", "1", cwd=tmp_path), "ct.nii", "intensity image")
 
 
+@pytest.mark.slow
 def test_the_boundary_is_drawn_before_it_is_filled(tmp_path):
     labels, affine = labels_of([ellipsoid((20, 15, 12))], (24, 19, 16), (1.5, 1.5, 2.0))
     path = write_nrrd(tmp_path / "ct.nrrd", labels, affine)

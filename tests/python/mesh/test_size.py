@@ -29,6 +29,7 @@ def millimetres(tmp_path):
     return tmp_path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("file", ["box.vtu", "box.stl"])
 def test_a_body_of_eighty_metres_asks_for_its_unit(millimetres, file):
     read = palpate.TetMesh.read if file.endswith("vtu") else palpate.tetrahedralize
@@ -70,6 +71,7 @@ def read_all(terminal: int) -> None:
             pass
 
 
+@pytest.mark.slow
 def test_on_a_terminal_the_unit_is_asked_for(millimetres):
     terminal, end = pty.openpty()
     os.write(terminal, b"mm\n")

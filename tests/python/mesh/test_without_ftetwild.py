@@ -69,6 +69,7 @@ def test_where_netgen_fails_too_the_error_names_the_package(without_ftetwild, mo
     assert "\n" not in str(e.value)
 
 
+@pytest.mark.slow
 def test_the_package_is_found_where_it_is_installed():
     pytest.importorskip("pytetwild", reason="pytetwild has no wheel for macOS", exc_type=ImportError)
     with warnings.catch_warnings(record=True) as notes:

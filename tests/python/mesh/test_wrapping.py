@@ -180,6 +180,7 @@ def test_a_surface_is_not_wrapped_where_netgen_is_asked_for():
         palpate.tetrahedralize(broken_ball(), unit="mm", mesher="netgen")
 
 
+@pytest.mark.slow
 def test_a_volume_lost_beyond_what_is_allowed_is_refused():
     """No mesh keeps the volume of a hollow ball to a ten-thousandth of a per cent."""
     ball = trimesh.creation.icosphere(subdivisions=2, radius=RADIUS)

@@ -131,6 +131,7 @@ def test_viewer_is_sent_flat_triangles_and_tets(built):
         session.close()
 
 
+@pytest.mark.slow
 def test_command_line_makes_and_solves_them(tmp_path):
     def run(*arguments):
         return command_line.run(*arguments, cwd=tmp_path)

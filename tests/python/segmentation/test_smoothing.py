@@ -69,6 +69,7 @@ def test_a_cavity_stays_and_the_edge_of_the_image_is_reported():
     assert enclosed(surface) == pytest.approx(surface.voxel_volume, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_fine_voxels_are_averaged_without_a_change_of_volume():
     labels, affine = labels_of([ball((0, 0, 0), 15)], (16, 16, 16), (0.1, 0.1, 0.5))
     surface = boundary(labels > 0, affine)

@@ -140,6 +140,7 @@ def test_the_rest_is_computed_beside_the_loop_and_goes_on_another_time(tmp_path)
     assert len(palpate.precompute(body, precision="f32", path=path, progress=False).touchable_nodes) == len(surface)
 
 
+@pytest.mark.slow
 def test_a_store_that_another_process_computes_is_waited_for_and_its_stages_are_taken(tmp_path):
     mesh = box_mesh((7, 7, 5), (SIDE, SIDE, SIDE), jitter=0.0)
     body = palpate.Body(mesh, material=palpate.Material(20e3, 0.4), fixed=mesh.nodes[:, 2] < 1e-9)

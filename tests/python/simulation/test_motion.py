@@ -136,6 +136,7 @@ def test_a_body_in_motion_sags_under_its_weight_and_moves_about_that(tmp_path):
     assert force == pytest.approx(expected, rel=1e-3, abs=1e-3 * np.linalg.norm(expected))
 
 
+@pytest.mark.slow
 def test_a_strike_excites_each_mode_by_its_share(tmp_path):
     """After an impulse `J` on a patch `W` a mode swings as `Phi^T W J / omega sin(omega t)`, each on its own."""
     built = scene(tmp_path, "scheme = 'exact'\nmodes = 12\nrayleigh = [0, 0]\n")

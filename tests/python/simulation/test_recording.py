@@ -142,6 +142,7 @@ def test_a_recording_asked_for_before_the_start_has_the_first_tick(built, tmp_pa
         running.record(tmp_path / "nowhere" / "a.mcap")
 
 
+@pytest.mark.slow
 def test_the_scene_of_a_recording_is_built_from_the_file_alone(scene_file, tmp_path):
     """In another process, by the command, with one thread and two."""
     simulation = palpate.Simulation(palpate.Scene.read(scene_file))

@@ -134,6 +134,7 @@ def test_a_running_loop_takes_the_series_up_when_the_tool_has_lifted(beam):
         assert simulation.series is None
 
 
+@pytest.mark.slow
 def test_a_tool_of_another_radius_gets_its_series_in_the_running_loop(known_beam):
     smaller = 0.006
     with Simulation(known_beam) as simulation:
@@ -154,6 +155,7 @@ def test_a_tool_of_another_radius_gets_its_series_in_the_running_loop(known_beam
     assert forces[-1, 2] < 0.93 * Simulation(without_series(bodies)).run(path)[-1, 1, 2]
 
 
+@pytest.mark.slow
 def test_a_recording_has_the_series_that_its_loop_had(beam, tmp_path):
     with Simulation(beam) as simulation:
         background = simulation.series

@@ -251,6 +251,7 @@ def test_a_modulus_that_does_not_scale_all_is_solved_each_time(folder, operators
     assert len(operators) == 2
 
 
+@pytest.mark.slow
 def test_parts_of_a_surface_are_bodies_of_their_own(folder):
     parts = [trimesh.creation.icosphere(2, 20.0), trimesh.creation.icosphere(2, 12.0)]
     parts[1].apply_translation([60.0, 0.0, 0.0])

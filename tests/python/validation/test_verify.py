@@ -66,6 +66,7 @@ def test_an_unknown_benchmark_is_refused_with_the_known_ones(monkeypatch, capsys
     assert "no benchmark is called 'nope'; there are patch, rigid" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_plots_of_what_was_run(monkeypatch, tmp_path):
     assert run_cli(monkeypatch, "verify", "convergence", "--out", str(tmp_path / "plots")) == 0
     assert [p.name for p in Path(tmp_path / "plots").iterdir()] == ["convergence.png"]

@@ -292,6 +292,7 @@ def view(page) -> dict[str, np.ndarray]:
     return {name: np.array(value) for name, value in page.evaluate("window.palpate.view()").items()}
 
 
+@pytest.mark.slow
 def test_two_fingers_turn_and_zoom_and_three_move_where_the_body_fills_the_screen(phone):
     phone.locator("#hint-close").tap()
     box = phone.locator("#canvas").bounding_box()

@@ -124,6 +124,7 @@ def test_first_there_are_few_controls_one_sentence_and_no_plots(chromium, progra
         assert sentence.count(".") == 1 and sentence.endswith(".") and "press" in sentence
 
 
+@pytest.mark.slow
 def test_more_is_remembered(chromium, program):
     with first_page(chromium, program) as page:
         more, body = page.get_by_test_id("more"), page.get_by_test_id("more-body")
@@ -247,6 +248,7 @@ def test_colours_come_over_the_tissue_where_it_is_strained_or_with_a_field(chrom
         assert is_tissue(eventually(page, look, is_tissue))
 
 
+@pytest.mark.slow
 def test_a_reader_hears_the_force_once_it_rests(chromium, program):
     with first_page(chromium, program) as page:
         press(page)
@@ -265,6 +267,7 @@ def test_a_reader_hears_the_force_once_it_rests(chromium, program):
         assert spoken.text_content() == "Nothing is touched."
 
 
+@pytest.mark.slow
 def test_the_body_is_pressed_and_turned_by_keys(chromium, program):
     with first_page(chromium, program) as page:
         page.locator("#canvas").focus()

@@ -98,6 +98,7 @@ def test_the_page_is_told_what_is_ready_and_what_it_paints_comes_next(scene):
     asyncio.run(run())
 
 
+@pytest.mark.slow
 def test_a_mask_that_is_none_is_refused_while_columns_are_computed(scene, monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     built, growing = scene.build_first(progress=False)

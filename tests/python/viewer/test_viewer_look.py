@@ -110,6 +110,7 @@ def test_a_screenshot_has_all_pixels_of_a_large_window(chromium, program, tmp_pa
         assert page.evaluate("document.getElementById('canvas').width") == drawn_pixels
 
 
+@pytest.mark.slow
 def test_the_scale_bar_is_true_and_follows_the_zoom(chromium, program):
     """The bar is measured in pixels of the layout: few of the screen are enough."""
     with opened(chromium, program) as page:

@@ -391,6 +391,7 @@ def test_a_page_from_another_origin_cannot_connect(chromium, program, tmp_path):
     elsewhere.server_close()
 
 
+@pytest.mark.slow
 def test_a_program_that_ends_is_noticed(chromium, cache):
     program = Program(cache, "liver", "--paper")
     context = chromium.new_context(device_scale_factor=0.25)

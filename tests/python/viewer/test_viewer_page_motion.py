@@ -84,6 +84,7 @@ def test_a_click_strikes_in_motion(moving_page):
     until(page, lambda s: s["motion"]["struck_at"] > after["motion"]["struck_at"])
 
 
+@pytest.mark.slow
 def test_modes_swing_one_by_one(moving_page):
     page = moving_page
     assert page.get_by_test_id("stiffness").is_disabled()

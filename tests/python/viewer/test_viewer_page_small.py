@@ -38,6 +38,7 @@ def boxes(page, names) -> dict[str, tuple[float, float, float, float]]:
     return found
 
 
+@pytest.mark.quick(4)
 @pytest.mark.parametrize("size", SIZES)
 def test_nothing_over_the_picture_overlaps(chromium, block_program, size):
     with opened(chromium, block_program, size) as page:
@@ -93,6 +94,7 @@ def test_a_press_on_the_inside_of_a_cut_is_answered(chromium, block_program):
         page.get_by_text("No tool reaches the inside that the cut shows").wait_for()
 
 
+@pytest.mark.slow
 def test_a_press_goes_on_with_another_tool(chromium, block_program):
     """The list is changed by its keys while the pointer is held down: the new tool presses there when it has come."""
     with opened(chromium, block_program) as page:

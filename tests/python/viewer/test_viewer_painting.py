@@ -147,6 +147,7 @@ def test_what_is_painted_is_asked_for(chromium, served):
         assert count(page, "waiting") == both
 
 
+@pytest.mark.quick(2)
 def test_what_is_ready_is_not_painted_and_escape_gives_the_pointer_back(chromium, served):
     dome = served.dome
     with opened(chromium, served) as page:

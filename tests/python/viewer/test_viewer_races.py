@@ -301,6 +301,7 @@ def test_a_device_that_is_gone_leaves_the_session_before_to_the_pointer(built, b
     asyncio.run(session())
 
 
+@pytest.mark.slow
 def test_a_file_cancelled_while_it_is_drawn_leaves_the_session_before(built, ball, monkeypatch):
     close = Session.close
 
@@ -325,6 +326,7 @@ def test_a_file_cancelled_while_it_is_drawn_leaves_the_session_before(built, bal
     asyncio.run(session())
 
 
+@pytest.mark.slow
 def test_a_touch_that_is_cancelled_late_ends_what_computes_its_columns(built, ball, saves, block_green, monkeypatch):
     growing, asked = StubGrowing(block_green), threading.Event()
 
@@ -398,6 +400,7 @@ def test_a_full_disk_is_a_message_and_parts_given_up_leave_nothing(saves, monkey
     asyncio.run(session())
 
 
+@pytest.mark.slow
 def test_segments_without_a_name_are_refused(ball, saves):
     async def session():
         async with empty_page(saves) as (_, client):

@@ -107,6 +107,7 @@ def test_what_is_painted_is_touched_and_saved_and_runs_again_with_the_same_store
     assert force[2] > 0.02
 
 
+@pytest.mark.slow
 def test_a_plane_and_a_nodule_are_in_the_scene_and_nothing_is_written_over(ball, saves):
     async def session():
         async with empty_page(saves) as (_, client):
@@ -138,6 +139,7 @@ WRONG_FILES = [
 ]
 
 
+@pytest.mark.slow
 def test_a_wrong_file_is_one_line_and_what_was_set_up_stays(ball, saves):
     async def session():
         async with empty_page(saves) as (server, client):
@@ -157,6 +159,7 @@ def test_a_wrong_file_is_one_line_and_what_was_set_up_stays(ball, saves):
     asyncio.run(session())
 
 
+@pytest.mark.slow
 def test_uploads_are_bounded_and_only_from_the_page_in_control(ball, saves):
     async def session():
         async with empty_page(saves) as (server, client), page(server) as watcher:
@@ -216,6 +219,7 @@ CHOICES_WITHOUT_SENSE = [
 ]
 
 
+@pytest.mark.slow
 def test_choices_that_make_no_sense_are_refused(ball, saves):
     async def session():
         async with empty_page(saves) as (server, client):
@@ -244,6 +248,7 @@ def test_tetrahedra_and_numbers_of_a_saved_scene_are_exact(tmp_path):
     assert list(scene.region[0].center) == numbers and scene.bodies[0].mesh == body["mesh"]
 
 
+@pytest.mark.slow
 def test_a_body_that_takes_long_is_touched_before_all_of_it_is_computed(ball, saves, monkeypatch):
     monkeypatch.setattr("palpate.scene.early.LONG", 0.0)
 

@@ -39,10 +39,7 @@ NEEDS_SERVER: dict[Callable, str] = {
 }
 # Of the others these run in every test run.
 QUICK = {
-    controls.test_reset_puts_all_sliders_back_at_once,
     pages.test_a_drag_slides_along_the_surface,
-    pages.test_a_grab_pulls,
-    pages.test_a_press_begins_at_the_surface_and_comes_to_a_gentle_depth,
     pages.test_the_size_of_the_body_is_told,
 }
 
