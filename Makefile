@@ -90,7 +90,7 @@ CARGO_TEST := cargo test --release --quiet --workspace --tests
 test: | check-tools
 	@# npm and pip wait for downloads while cargo compiles.
 	$(CARGO_TEST) --no-run & \
-		$(MAKE) --no-print-directory $(PAGE) $(WEB) viewer/node_modules/.checks $(VENV)/.installed; status=$$?; \
+		$(MAKE) --no-print-directory $(PAGE) viewer/node_modules/.checks $(VENV)/.installed; status=$$?; \
 		wait $$! && exit $$status
 	$(CARGO_TEST)
 	cd viewer && npm run --silent check

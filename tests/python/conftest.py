@@ -21,7 +21,7 @@ def pytest_addoption(parser):
         "--no-skips", action="store_true", help="a skipped test is a failure, as on a machine with all tools"
     )
     parser.addoption("--whole", action="store_true", help="campaigns with all of their cases, for about an hour")
-    parser.addoption("--part", default="0/1", help="of the files with slow tests, those of part K of N: K/N, K from 0 on")
+    parser.addoption("--part", default="0/1", help="of the files with slow tests, part K of N: K/N, K from 0 on")
 
 
 def pytest_configure(config):

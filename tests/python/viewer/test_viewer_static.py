@@ -23,7 +23,8 @@ from viewer import test_viewer_page_motion as motion
 from viewer import test_viewer_thin as thin
 from viewer import test_viewer_two_tools as two_tools
 
-pytestmark = MARKS
+# Slow, for the program of such a page is built for campaigns only.
+pytestmark = [*MARKS, pytest.mark.slow]
 
 # Modules whose tests open the page of the paper's liver, and what their tests may ask for.
 MODULES = [controls, first_minute, look, pages]
@@ -37,11 +38,6 @@ NEEDS_SERVER: dict[Callable, str] = {
     pages.test_cut_away_and_another_model: "stresses",
     look.test_a_range_is_locked_where_it_is_or_where_it_is_typed: "stresses",
 }
-# Of the others these run in every test run.
-QUICK = {
-    pages.test_a_drag_slides_along_the_surface,
-    pages.test_the_size_of_the_body_is_told,
-}
 
 
 def page_tests() -> list:
@@ -54,8 +50,7 @@ def page_tests() -> list:
         for parameters in [first_parameters(test)]
         if set(inspect.signature(test).parameters) <= FIXTURES | set(parameters)
     ]
-    marked = [[] if test in QUICK else [pytest.mark.slow] for test, _ in tests]
-    return [pytest.param(*one, id=one[0].__name__, marks=marks) for one, marks in zip(tests, marked, strict=True)]
+    return [pytest.param(*one, id=one[0].__name__) for one in tests]
 
 
 def first_parameters(test) -> dict:
@@ -133,7 +128,6 @@ def test_of_the_page(request, test, parameters):
     test(**{name: request.getfixturevalue(name) for name in wanted}, **parameters)
 
 
-@pytest.mark.slow
 def test_stresses_are_listed_but_cannot_be_chosen(chromium, program):
     with opened(chromium, program) as page:
         options = page.locator("#field option").evaluate_all(
@@ -147,7 +141,6 @@ def test_stresses_are_listed_but_cannot_be_chosen(chromium, program):
     assert {"displacement", "strain"} <= {name for name, *_ in options}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("test", "scene"), OTHERS, ids=lambda value: getattr(value, "__name__", value))
 def test_of_the_page_of_another_scene(chromium, site_of_others, test, scene):
     program = SimpleNamespace(address=f"{site_of_others}/index.html?scene={scene}")
@@ -157,7 +150,6 @@ def test_of_the_page_of_another_scene(chromium, site_of_others, test, scene):
         test(chromium, program)
 
 
-@pytest.mark.slow
 def test_of_the_page_of_a_body_in_motion(chromium, moving_site):
     with opened(chromium, SimpleNamespace(address=f"{moving_site}/index.html?scene=beam")) as page:
         motion.test_a_click_strikes_in_motion(page)

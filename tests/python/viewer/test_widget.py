@@ -42,6 +42,7 @@ def built(shared_cache):
 
 @pytest.mark.browser
 @pytest.mark.skipif(shutil.which("chromium") is None, reason="no Chromium")
+@pytest.mark.slow
 def test_the_widget_runs_the_scene_to_the_bit(chromium, built, tmp_path):
     widget = palpate.widget(built, height=300)
     texts = {name: getattr(widget, name) for name in ("page", "script", "worker", "height")}
