@@ -250,8 +250,7 @@ fn an_older_struct_is_read_and_filled_as_far_as_it_reaches() {
     unsafe { write(&answer, (&raw mut older).cast::<NewerStruct>()) }.expect("an older struct");
     assert_eq!((older.struct_size, older.first, older.second, older.behind), (16, 4, 5.0, 9.0));
     // SAFETY: 16 bytes are there.
-    unsafe { write_as(&NewerStruct::default(), (&raw mut older).cast::<NewerStruct>(), 16) }
-        .expect("an older struct");
+    unsafe { write_as(&NewerStruct::default(), (&raw mut older).cast::<NewerStruct>(), 16) }.expect("an older struct");
     assert_eq!((older.struct_size, older.first, older.second, older.behind), (16, 1, 2.0, 9.0));
 }
 
@@ -260,9 +259,8 @@ fn a_newer_struct_and_none_at_all_are_refused() {
     for (size, words) in [(32, "newer palpate.h"), (15, "set it to sizeof(grown)"), (0, "sizeof(grown)")] {
         let mut stated_size = NewerStruct { struct_size: size, ..NewerStruct::default() };
         // SAFETY: refused by its size alone.
-        let refusals = unsafe {
-            [read(&raw const stated_size).err(), write(&NewerStruct::default(), &raw mut stated_size).err()]
-        };
+        let refusals =
+            unsafe { [read(&raw const stated_size).err(), write(&NewerStruct::default(), &raw mut stated_size).err()] };
         for refusal in refusals {
             let refusal = refusal.expect("refused");
             assert_eq!(refusal.status, Status::PalpateErrorArgument);
