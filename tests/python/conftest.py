@@ -82,7 +82,10 @@ def thin_campaigns(config, items) -> None:
     slow tests of files that are not of the wanted part.
     """
     part, parts = map(int, config.getoption("--part").split("/"))
-    files = sorted({item.path for item in items if item.get_closest_marker("slow")})
+    # Browsers share one process, so each part gets as many of their files as the others.
+    browsers = {item.path for item in items if item.get_closest_marker("browser")}
+    slow_files = {item.path for item in items if item.get_closest_marker("slow")}
+    files = sorted(slow_files, key=lambda path: (path not in browsers, path.name, path))
     others = {path for place, path in enumerate(files) if place % parts != part}
     seen, deselected, selected = {}, [], []
     for item in items:
