@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import faulthandler
 import os
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -66,37 +67,27 @@ def pytest_runtest_setup(item):
         shared.close()
 
 
-def mark_slow_cases(items) -> None:
-    """Mark as slow all but one in ``every`` cases of a test with the marker ``quick(every)``, evenly spread."""
-    seen = {}
+def beyond_share(items, name: str, slow: bool) -> list:
+    """Slow cases, or the others, of tests with the marker ``name(every)``, but for one in ``every``, evenly spread."""
+    seen, found = Counter(), []
     for item in items:
-        marker = item.get_closest_marker("quick")
-        if marker is not None and not item.get_closest_marker("slow"):
-            rank = seen[item.function] = seen.get(item.function, -1) + 1
-            if rank % marker.args[0]:
-                item.add_marker("slow")
+        marker = item.get_closest_marker(name)
+        if marker is not None and (item.get_closest_marker("slow") is not None) == slow:
+            if seen[item.function] % marker.args[0]:
+                found.append(item)
+            seen[item.function] += 1
+    return found
 
 
-def thin_campaigns(config, items) -> None:
-    """Deselect all but one in ``every`` slow cases of a test with the marker ``campaign(every)``, evenly spread, and
-    slow tests of files that are not of the wanted part.
-    """
+def of_other_parts(config, items) -> list:
+    """Slow tests of files that are not of the wanted part."""
     part, parts = map(int, config.getoption("--part").split("/"))
+    slow = [item for item in items if item.get_closest_marker("slow")]
     # Browsers share one process, so each part gets as many of their files as the others.
     browsers = {item.path for item in items if item.get_closest_marker("browser")}
-    slow_files = {item.path for item in items if item.get_closest_marker("slow")}
-    files = sorted(slow_files, key=lambda path: (path not in browsers, path.name, path))
-    others = {path for place, path in enumerate(files) if place % parts != part}
-    seen, deselected, selected = {}, [], []
-    for item in items:
-        marker = item.get_closest_marker("campaign")
-        slow = item.get_closest_marker("slow") is not None
-        thinned = marker is not None and slow and not config.getoption("--whole")
-        rank = seen[item.function] = seen.get(item.function, -1) + bool(thinned)
-        left_out = (thinned and rank % marker.args[0]) or (slow and item.path in others)
-        (deselected if left_out else selected).append(item)
-    items[:] = selected
-    config.hook.pytest_deselected(items=deselected)
+    files = sorted({item.path for item in slow}, key=lambda path: (path not in browsers, path.name, path))
+    wanted = set(files[part::parts])
+    return [item for item in slow if item.path not in wanted]
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -105,8 +96,13 @@ def pytest_collection_modifyitems(config, items):
 
     The browsers come first and then files with slow tests, so that no worker is left with a long one at the end.
     """
-    mark_slow_cases(items)
-    thin_campaigns(config, items)
+    for item in beyond_share(items, "quick", slow=False):
+        item.add_marker("slow")
+    left_out = set(of_other_parts(config, items))
+    if not config.getoption("--whole"):
+        left_out.update(beyond_share(items, "campaign", slow=True))
+    config.hook.pytest_deselected(items=[item for item in items if item in left_out])
+    items[:] = [item for item in items if item not in left_out]
     slow = {item.path for item in items if item.get_closest_marker("slow")}
 
     def rank(item) -> int:

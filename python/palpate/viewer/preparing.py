@@ -82,8 +82,9 @@ async def prepare(server: ViewerServer, preparation: Preparation) -> None:
         drawn.append(asyncio.run_coroutine_threadsafe(show(vertices, triangles), loop))
 
     try:
-        end = lambda prepared: Computing(prepared.growing).close()  # noqa: E731
-        prepared = await building.run(lambda: preparation.build(reporter, draw), end)
+        prepared = await building.run(
+            lambda: preparation.build(reporter, draw), lambda late: Computing(late.growing).close()
+        )
         for future in drawn:
             await asyncio.wrap_future(future)
         session = await server.call(server.first_session, prepared.built, prepared.maps, prepared.growing)
