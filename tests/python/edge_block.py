@@ -150,7 +150,7 @@ class DirectContact:
         self._faces = local.reshape(faces.shape)
         green = green_of(body_of(mesh, half=True), touch=self._nodes)
         self._places = mesh.nodes[self._nodes]
-        self._compliance = _compliance(green, self._nodes)
+        self._compliance = compliance_between(green, self._nodes)
         self._shapes, self._hats, self._areas = self._quadrature()
 
     def press(self, tool: Distance, places: np.ndarray, rotation: Rotation, rounds: int = 30) -> np.ndarray:
@@ -222,7 +222,7 @@ def _near_faces(mesh: TetMesh, region: Region) -> np.ndarray:
     return faces[own & (np.ptp(mesh.nodes[faces[:, :3], 1], axis=1) > 1e-9)]
 
 
-def _compliance(green: GreensFunction, nodes: np.ndarray) -> np.ndarray:
+def compliance_between(green: GreensFunction, nodes: np.ndarray) -> np.ndarray:
     """`Psi` (3n, 3n) between nodes, m/N, axis by axis."""
     rows, columns = (np.searchsorted(some, nodes) for some in (green.surface_nodes, green.touchable_nodes))
     entry, n = green._core.entry, 3 * len(nodes)

@@ -15,8 +15,9 @@ pub struct LocalContact {
     pub orientation: DQuat,
     /// Position of the tool over the surface at rest, `p' = p - u`, without the displacement `u` of the body below it, m.
     pub relative_position: DVec3,
-    /// Way of the tool in this tick, m.
+    /// Way of the tool in this tick, m, and the part of it along the contact's plane, m.
     pub travel: f64,
+    pub travel_along: f64,
     /// Displacement of that position in the last tick, m.
     pub last_step: DVec3,
     /// Orientation a tick ago.
@@ -33,8 +34,11 @@ pub struct LocalContact {
     pub is_new: bool,
     /// Largest depth that the tool can have reached since the last search for additional contacts, m.
     pub reachable_depth: f64,
-    /// Whether it fades, with its foot fixed on its plane, because the surface has no closest point there any more.
+    /// Whether its foot is fixed on its plane, because the surface has no closest point there any more or Newton's method has
+    /// diverged: it fades by its rate, or if that is zero with the way of the tool along the plane.
     pub is_fading: bool,
+    /// Normal of that plane, towards the tool: the direction of the force when it was fixed.
+    pub plane_normal: DVec3,
     /// Its part of the half-space's stiffness, and the change of that part in a tick.
     pub part: f64,
     pub part_rate: f64,
@@ -45,6 +49,11 @@ pub struct LocalContact {
 }
 
 impl LocalContact {
+    /// Normal of the surface at the foot, or of the plane on which it is fixed.
+    pub fn normal(&self) -> DVec3 {
+        if self.is_fading { self.plane_normal } else { self.foot.normal }
+    }
+
     /// Plane of the contact a tick ago, for a tool that is not a sphere.
     pub fn plane(&self) -> Plane {
         Plane { point: self.foot.position, normal: self.foot.normal }

@@ -24,12 +24,13 @@ pub fn is_sound(model: &Model, contact: &Contact, stiffness_scale: f64) -> bool 
     let Some(own) = &body.local else { return true };
     let size = tool.shape.bounding_radius();
     let depth = match tool.shape {
-        ToolShape::Sphere { radius } => radius - (local.relative_position - local.foot.position).dot(local.foot.normal),
+        ToolShape::Sphere { radius } => radius - (local.relative_position - local.foot.position).dot(local.normal()),
         ref shape => {
             let pose = (local.relative_position, glam::DMat3::from_quat(local.orientation));
-            depth_below(shape, pose, &local.foot).max(local.penetration)
+            depth_below(shape, pose, &local.foot)
         }
     }
+    .max(local.penetration)
     .max(0.0);
     let [low, high] = own.bounds.map(|corner| corner - contact.point);
     let on_body = low.max_element() <= MARGIN_OUTSIDE * size && high.min_element() >= -MARGIN_OUTSIDE * size;

@@ -5,7 +5,11 @@
 //! next minimum, if there is one on the same side, grows by the same part. Where it is deeper, its approach counts from that of the
 //! old one. So the force does not jump, and both together store no more energy than the old one did.
 //!
-//! Two contacts whose closest points coincide have merged: the later one fades.
+//! Two contacts whose closest points coincide have merged: the later one fades. One without a force that comes to another ends.
+//!
+//! Where Newton's method diverges, as under a tool that is pressed deep between two walls of a hollow, the contacts that it has lost
+//! stay on their planes too, with the compliance of their places: there is an equilibrium at any depth. They fade with the way of the
+//! tool along their planes only, so that a deeper press has more force, and one that ends gives back no more than was put in.
 
 use glam::{DMat3, DVec3};
 
@@ -15,7 +19,7 @@ use super::near_corner::share_of_contact;
 use super::response::LocalResponse;
 use crate::contact::shape::ToolShape;
 use crate::contact::smooth::FootPoint;
-use crate::simulation::contacts::{Contact, Mode};
+use crate::simulation::contacts::{Contact, LocalContact, Mode};
 use crate::simulation::model::Model;
 use crate::simulation::state::State;
 use crate::simulation::tool::ToolModel;
@@ -26,6 +30,8 @@ const PENDING_REACH: f64 = 0.6;
 pub const DEEPEST_START: f64 = 0.4;
 /// Ticks in which a contact fades.
 const FADE_TICKS: f64 = 100.0;
+/// Part down to which a contact on its plane holds off the next contact of its tool.
+const LASTING_PART: f64 = 0.9;
 /// Least part of the half-space that a contact has.
 const LEAST_PART: f64 = 1e-6;
 /// A foot has jumped if its travel in a tick exceeds this many times that of the tool plus this distance, over the tool's radius.
@@ -69,11 +75,15 @@ pub fn replace_jumped_contacts(model: &Model, state: &mut State, solved: SolvedC
     let mut any = false;
     for (a, &slot) in slots.iter().enumerate() {
         let (response, place) = (&solved.responses[a], solved.positions[a]);
-        if !foot_has_jumped(model, &state.contacts.slots[slot], response, place) {
+        let contact = state.contacts.slots[slot];
+        // One without a force whose foot comes to that of another would be the other once more.
+        let is_double = contact.additional
+            && contact.local.force == DVec3::ZERO
+            && contact_at_same_foot(model, state, solved, slots, a).is_some();
+        if !is_double && !foot_has_jumped(model, &contact, response, place) {
             continue;
         }
         any = true;
-        let contact = state.contacts.slots[slot];
         if contact.local.force == DVec3::ZERO {
             match contact.additional {
                 true => state.contacts.clear(slot),
@@ -83,7 +93,7 @@ pub fn replace_jumped_contacts(model: &Model, state: &mut State, solved: SolvedC
             }
             continue;
         }
-        begin_fading(&mut state.contacts.slots[slot]);
+        begin_fading(model, &mut state.contacts.slots[slot]);
         if foot_is_taken(model, state, solved, slots, a) {
             continue;
         }
@@ -100,26 +110,48 @@ pub fn replace_jumped_contacts(model: &Model, state: &mut State, solved: SolvedC
 }
 
 /// Starts the fading of a contact, with its foot fixed.
-fn begin_fading(contact: &mut Contact) {
+fn begin_fading(model: &Model, contact: &mut Contact) {
     contact.additional = true;
-    (contact.local.is_fading, contact.local.part_rate) = (true, -1.0 / FADE_TICKS);
+    fix_on_plane(&model.tools[contact.tool], contact, -1.0 / FADE_TICKS);
 }
 
-/// Starts the fading of contacts for which Newton's method has diverged: those with the longest last steps. The force of the next
+/// Fixes a contact on a plane that is normal to its force. Under a sphere its approach becomes that at which the half-space presses
+/// back by the whole force, so that the force at the same position stays the same: it grows with the power 3/2 of the approach, and
+/// what inclined it came from the gradients along the surface.
+fn fix_on_plane(tool: &ToolModel, contact: &mut Contact, part_rate: f64) {
+    let local = &mut contact.local;
+    let push = -(local.force - local.friction.force());
+    let straight = push.dot(local.foot.normal);
+    (local.is_fading, local.part_rate, local.plane_normal) = (true, part_rate, local.foot.normal);
+    if straight > 0.0 && !tool.shape.needs_cells() {
+        (local.plane_normal, local.offset) = (push.normalize(), DVec3::ZERO);
+        let approach = local.penetration;
+        local.entry_depth = 0.0;
+        let depth = contact_depth(tool, contact, contact.local.relative_position);
+        contact.local.entry_depth = depth - approach;
+    }
+}
+
+/// Fixes contacts for which Newton's method has diverged on their planes: those with the longest last steps. The force of the next
 /// contact starts from zero.
-pub fn fade_lost_contacts(state: &mut State, steps: &[DVec3], slots: &[usize]) {
+pub fn fix_lost_contacts(model: &Model, state: &mut State, steps: &[DVec3], slots: &[usize]) {
     let longest = steps.iter().map(|step| step.length()).fold(0.0, f64::max);
     for (&slot, step) in slots.iter().zip(steps) {
-        let Contact { tool, body, local, .. } = state.contacts.slots[slot];
-        if step.length() < 0.5 * longest || local.is_fading {
+        let contact = &mut state.contacts.slots[slot];
+        if step.length() < 0.5 * longest || contact.local.is_fading {
             continue;
         }
-        state.tools[tool].entry[body].threshold = f64::INFINITY;
-        match local.force == DVec3::ZERO {
+        state.tools[contact.tool].entry[contact.body].threshold = f64::INFINITY;
+        match contact.local.force == DVec3::ZERO {
             true => state.contacts.clear(slot),
-            false => begin_fading(&mut state.contacts.slots[slot]),
+            false => fix_on_plane(&model.tools[contact.tool], contact, 0.0),
         }
     }
+}
+
+/// Whether a contact on its plane has faded so little that its tool begins no other one.
+pub fn lasts_on_its_plane(contact: &Contact) -> bool {
+    !contact.additional && contact.local.part_rate == 0.0 && contact.local.part > LASTING_PART
 }
 
 /// Part by which the compliance of two contacts of one tool at a distance is that of one contact.
@@ -128,22 +160,32 @@ pub fn merge_share(distance: f64, radius: f64) -> f64 {
     1.0 - t * t * (3.0 - 2.0 * t)
 }
 
+/// Another contact of the same tool whose foot is that of this one, by its rank in `slots`.
+fn contact_at_same_foot(
+    model: &Model,
+    state: &State,
+    solved: SolvedContacts<'_>,
+    slots: &[usize],
+    a: usize,
+) -> Option<usize> {
+    let (contact, foot) = (&state.contacts.slots[slots[a]], &solved.responses[a].foot);
+    let merged = MERGED_DISTANCE * model.tools[contact.tool].radius;
+    (0..slots.len()).filter(|&b| b != a).find(|&b| {
+        let other = &state.contacts.slots[slots[b]];
+        let near = solved.responses[b].foot.position.distance(foot.position) < merged;
+        near && (other.tool, other.body) == (contact.tool, contact.body)
+    })
+}
+
 /// Whether another contact of the same tool has the foot that this one has jumped to. A fading contact there grows again.
 fn foot_is_taken(model: &Model, state: &mut State, solved: SolvedContacts<'_>, slots: &[usize], a: usize) -> bool {
-    let (contact, foot) = (state.contacts.slots[slots[a]], &solved.responses[a].foot);
-    let merged = MERGED_DISTANCE * model.tools[contact.tool].radius;
-    for (b, &slot) in slots.iter().enumerate().filter(|&(b, _)| b != a) {
-        let other = &mut state.contacts.slots[slot];
-        let near = solved.responses[b].foot.position.distance(foot.position) < merged;
-        if near && (other.tool, other.body) == (contact.tool, contact.body) {
-            if other.local.is_fading {
-                (other.local.is_fading, other.local.part_rate) = (false, 1.0 / FADE_TICKS);
-                move_foot(&model.tools[contact.tool], other, foot, solved.positions[b]);
-            }
-            return true;
-        }
+    let Some(b) = contact_at_same_foot(model, state, solved, slots, a) else { return false };
+    let other = &mut state.contacts.slots[slots[b]];
+    if other.local.is_fading {
+        other.local.part_rate = 1.0 / FADE_TICKS;
+        move_foot(&model.tools[other.tool], other, &solved.responses[a].foot, solved.positions[b]);
     }
-    false
+    true
 }
 
 /// Begins a contact at the foot that another one has jumped to, with at most the same approach.
@@ -160,19 +202,20 @@ fn begin_replacement(model: &Model, state: &mut State, before: &Contact, (respon
     add_contact(state, next);
 }
 
-/// Moves the foot of a contact. Where the tool is deeper, the approach is reduced to what it was.
+/// Moves the foot of a contact, which fades no more. Where the tool is deeper, the approach is reduced to what it was.
 fn move_foot(tool: &ToolModel, contact: &mut Contact, foot: &FootPoint, place: DVec3) {
-    let before = contact_depth(tool, contact, place);
-    contact.local.foot = *foot;
-    contact.local.entry_depth += (contact_depth(tool, contact, place) - before).max(0.0);
+    let approach = contact_depth(tool, contact, place) - contact.local.entry_depth;
+    (contact.local.foot, contact.local.is_fading) = (*foot, false);
+    let deepest = contact_depth(tool, contact, place) - approach;
+    contact.local.entry_depth = deepest.max(contact.local.entry_depth).max(0.0);
 }
 
 /// Depth of a tool below the plane through its contact's foot, m.
 pub fn contact_depth(tool: &ToolModel, contact: &Contact, place: DVec3) -> f64 {
-    let foot = &contact.local.foot;
+    let LocalContact { foot, orientation, .. } = &contact.local;
     match tool.shape {
-        ToolShape::Sphere { radius } => radius - (place - foot.position).dot(foot.normal),
-        ref shape => depth_below(shape, (place, DMat3::from_quat(contact.local.orientation)), foot),
+        ToolShape::Sphere { radius } => radius - (place - foot.position).dot(contact.local.normal()),
+        ref shape => depth_below(shape, (place, DMat3::from_quat(*orientation)), foot),
     }
 }
 
@@ -183,13 +226,14 @@ pub fn update_parts(model: &Model, state: &mut State, responses: &[LocalResponse
     for grows in [false, true] {
         for (a, &slot) in slots.iter().enumerate() {
             let Contact { mode, tool, local, .. } = state.contacts.slots[slot];
-            if mode == Mode::Free || local.part_rate == 0.0 || (local.part_rate > 0.0) != grows {
+            if mode == Mode::Free || (local.part_rate == 0.0 && !local.is_fading) || (local.part_rate > 0.0) != grows {
                 continue;
             }
             let whole = responses[a].indentation.energy / local.part;
             let bound = if whole > 0.0 { state.tools[tool].released_energy / whole } else { f64::INFINITY };
             // The plane of a fading contact has no end, but the body has: the contact fades faster, the faster its tool moves.
-            let left_behind = if local.is_fading { local.travel / model.tools[tool].radius } else { 0.0 };
+            let travel = if local.part_rate == 0.0 { local.travel_along } else { local.travel };
+            let left_behind = if local.is_fading { travel / model.tools[tool].radius } else { 0.0 };
             let part = (local.part + (local.part_rate - left_behind).min(bound)).clamp(LEAST_PART, 1.0);
             state.tools[tool].released_energy += (local.part - part) * whole;
             let local = &mut state.contacts.slots[slot].local;
@@ -236,7 +280,7 @@ pub fn fade_merged_contacts(model: &Model, state: &mut State, slots: &[usize]) {
             if last && have_merged(&model.tools[second.tool], &first.local.foot, &second.local.foot) {
                 match second.force == DVec3::ZERO {
                     true => state.contacts.clear(slot),
-                    false => begin_fading(&mut state.contacts.slots[slot]),
+                    false => begin_fading(model, &mut state.contacts.slots[slot]),
                 }
             }
         }

@@ -15,6 +15,7 @@
 //! | body with a series | what the series leaves out, `|U_5| / U_2` |
 //! | body without a series | square of the depth over the thickness `t` |
 //! | other contacts of the body: they act linearly | their displacement over the depth |
+//! | contact that stays on its plane, where none of the surface is the closest (`foot_jumps`) | constant |
 //! | friction: it hinders the sliding of the surface under the tool | force of a tool that sticks over that of one that slides |
 //!
 //! A rigid punch that sticks is pushed back by `(1 - nu) ln(3 - 4 nu) / (1 - 2 nu)` times the force of a smooth one (Mossakovskii,
@@ -61,6 +62,8 @@ const DEEPEST: f64 = 1.5;
 const BY_SERIES: f64 = 2.0;
 const BY_DEPTH: f64 = 0.2;
 const BY_OTHERS: f64 = 0.5;
+/// Error of a contact on its plane: in the hollow of a kidney the force was 16 to 25 % too large.
+const ON_PLANE: f64 = 0.25;
 /// Coefficient of friction from which a tool sticks nearly everywhere.
 const STICKING: f64 = 0.3;
 /// Largest depth that counts, over the radius and over the thickness.
@@ -106,6 +109,7 @@ pub fn estimate(
         (1.0 - known) * BY_DEPTH * ((depth + around.by_loads.length()) * inverse_thickness).powi(2),
         BY_OTHERS * around.by_others.length() / depth * (depth / indentation.effective_radius).min(1.0),
         sticking(material.poisson) * (around.friction / STICKING).min(1.0),
+        if contact.local.is_fading { ON_PLANE } else { 0.0 },
     ];
     // Deeper than that the force stays what it is there.
     let most = (MOST_RADII * indentation.effective_radius).min(MOST_THICKNESS / inverse_thickness);

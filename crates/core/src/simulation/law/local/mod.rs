@@ -269,7 +269,8 @@ impl Law for Local {
 
     fn update(&self, approach: &Approach<'_>, contact: &mut Contact) -> bool {
         let local = &mut contact.local;
-        let travel = approach.position.distance(local.tool_position);
+        let way = approach.position - local.tool_position;
+        let travel = way.length();
         let has_jumped = travel > JUMP * approach.tool.radius;
         // A position over the surface at rest moves about as far as its tool, or less. Any excess is the residual of the method,
         // below its tolerance in a tick: extrapolated, it would repeat until it exceeds the tolerance, and then be undone at once.
@@ -277,12 +278,13 @@ impl Law for Local {
             local.last_step = local.last_step.clamp_length_max(STEP_PER_MOTION * travel);
         }
         (local.tool_position, local.orientation, local.travel) = (approach.position, approach.orientation, travel);
+        local.travel_along = way.reject_from_normalized(local.foot.normal).length();
         // After a jump a new contact starts from the depth stored in the tool's state.
         !approach.grab && !has_jumped
     }
 
     fn persists(&self, contact: &Contact) -> bool {
-        !contact.local.is_fading
+        !contact.local.is_fading || foot_jumps::lasts_on_its_plane(contact)
     }
 
     /// Walls beside a tool that is not a sphere are found after it has been pressed.

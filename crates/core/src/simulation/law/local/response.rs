@@ -115,13 +115,9 @@ pub(super) fn evaluate_sphere(
     others: OtherContacts,
     (weights, response): (&mut FanWeights, &mut LocalResponse),
 ) -> Option<()> {
-    let foot = match contact.is_fading {
+    let mut foot = match contact.is_fading {
         true => contact.foot.frozen(guess.place),
         false => body.smooth.foot(body.drawn, guess.place - guess.offset, guess.foot, &mut weights.near)?,
-    };
-    let distance = match body.series {
-        Some(_) => foot.distance.signum() * hypot(foot.distance, guess.offset.length()),
-        None => foot.distance,
     };
     let near_edge = match contact.is_fading {
         true => None,
@@ -133,6 +129,14 @@ pub(super) fn evaluate_sphere(
     if weights.is_outside() {
         return None;
     }
+    if contact.is_fading {
+        foot.normal = contact.plane_normal;
+        foot.distance = (guess.place - foot.position).dot(foot.normal);
+    }
+    let distance = match body.series {
+        Some(_) if !contact.is_fading => foot.distance.signum() * hypot(foot.distance, guess.offset.length()),
+        _ => foot.distance,
+    };
     let mut fields = blend_fields(weights, body.fields, body.is_hyperelastic);
     if let Some(near_edge) = &near_edge {
         near_edge.soften(&mut fields);

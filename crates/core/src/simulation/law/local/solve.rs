@@ -13,7 +13,7 @@ use super::additional::other_planes;
 use super::coupling::{blend_patch, couple};
 use super::energy_surplus::{commit_energy, observe_energy, remove_energy_surplus};
 use super::foot_jumps::{
-    SolvedContacts, contact_depth, continue_contact, fade_lost_contacts, fade_merged_contacts, foot_has_jumped,
+    SolvedContacts, contact_depth, continue_contact, fade_merged_contacts, fix_lost_contacts, foot_has_jumped,
     replace_jumped_contacts, update_parts,
 };
 use super::force_error::{ForceError, estimate};
@@ -114,7 +114,7 @@ pub fn local_forces(model: &Model, state: &mut State, mut memory: TickMemory<'_>
             Outcome::Unsolved => return keep_previous_forces(state, slots),
             Outcome::Diverged if last => return keep_previous_forces(state, slots),
             Outcome::Diverged => {
-                fade_lost_contacts(state, &memory.local.steps[..count], slots);
+                fix_lost_contacts(model, state, &memory.local.steps[..count], slots);
                 last = true;
                 continue;
             }
@@ -461,7 +461,10 @@ fn store_results(
         own.last_step = if is_first { DVec3::ZERO } else { local.positions[a] - own.relative_position };
         own.relative_position = local.positions[a];
         own.previous_orientation = own.orientation;
-        (own.foot, own.offset, own.penetration) = (response.foot, response.offset, response.indentation.depth);
+        (own.offset, own.penetration) = (response.offset, response.indentation.depth);
+        if !own.is_fading {
+            own.foot = response.foot;
+        }
         own.friction = response.springs();
         let indentation = &response.indentation;
         (contact.torque, contact.radius) = (response.torque, indentation.radius);
