@@ -23,13 +23,13 @@ HOLLOW = NODES[-1]
 DEEP, TICK, START = 1.5, 20e-6, 0.5e-3
 # Surface that may be touched, over the radius.
 AROUND = 4.0
-# Part of the force that may be lost on the way: the compliance has a kink over an element's edge, and the force of a contact
-# that is fixed on a plane is not inclined by its gradient any more.
+# Part of the force that may be lost on the way: the compliance has a kink over an element's edge, and its gradient
+# does not incline the force of a contact on a plane.
 LOST = 0.025
 # Largest change of the force in a tick, over the largest force.
 JUMP = 0.05
-# Depths in the hollow, m, and largest difference there from a direct solution of the linear body. The half-spaces of the
-# two walls overlap from 3 mm on.
+# Depths in the hollow, m, and largest difference there from a direct solution of the linear body. From 3 mm on the
+# half-spaces of the two walls overlap.
 HOLLOW_DEPTHS, HOLLOW_TOLERANCE = np.array([1e-3, 2e-3, 4e-3, 6e-3, 8e-3]), np.array([0.1, 0.15, 0.3, 0.35, 0.35])
 
 
