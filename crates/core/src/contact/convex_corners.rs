@@ -8,11 +8,14 @@
 //! Along edges between corners a sphere has the closed form: cells that pass over an edge give energies whose differences are
 //! forces to 15 % only, so that closed paths over a thin rim would gain energy.
 
+use std::f64::consts::TAU;
+
 use glam::DVec3;
 
 use super::footprint::{PressedSurface, smooth_step};
 use super::smooth::SmoothSurface;
 use super::{SurfaceQuery, TriangleLists};
+use crate::math::atan2;
 use crate::memory::Ranges;
 use crate::mesh::Surface;
 
@@ -22,8 +25,10 @@ const NEAR: [f64; 2] = [1.2, 2.2];
 /// Corners up to this distance from a triangle, over the radius, are listed for it: the sphere's centre may lie as deep below the
 /// triangle as it is far from the corner.
 const LISTED: f64 = 2.0 * NEAR[1];
-/// Least number of convex creases that meet in a corner.
+/// Least number of convex creases that meet in a corner, and least angle that its faces lack of a whole turn, rad: a cube's lack
+/// `pi / 2`. Creases of a rim may meet in a saddle, whose faces have more than a whole turn, and under which nothing is missing.
 const LEAST_CREASES: usize = 3;
+const LEAST_LACKING: f64 = 0.2;
 
 /// A surface with sharp convex corners, for a sphere.
 pub struct CornerSurface {
@@ -73,17 +78,26 @@ impl CornerSurface {
 
 /// Positions of the nodes in which several creases meet whose faces turn away from each other, m.
 fn convex_corners(surface: &Surface, smooth: &SmoothSurface) -> Vec<DVec3> {
-    let mut counts = vec![0; surface.positions.len()];
+    let mut nodes = vec![(0, TAU); surface.positions.len()];
     for node in smooth.convex_creases(surface).flat_map(|crease| crease.nodes) {
-        counts[node as usize] += 1;
+        nodes[node as usize].0 += 1;
     }
-    surface.positions.iter().zip(counts).filter(|&(_, count)| count >= LEAST_CREASES).map(|(&at, _)| at).collect()
+    for (t, triangle) in surface.triangles.iter().enumerate() {
+        let ends = surface.corners(t as u32);
+        for k in 0..3 {
+            let [next, last] = [ends[(k + 1) % 3] - ends[k], ends[(k + 2) % 3] - ends[k]];
+            nodes[triangle[k] as usize].1 -= atan2(next.cross(last).length(), next.dot(last));
+        }
+    }
+    let is_corner = |&(_, (count, lacking)): &(_, (usize, f64))| count >= LEAST_CREASES && lacking > LEAST_LACKING;
+    surface.positions.iter().zip(nodes).filter(is_corner).map(|(&at, _)| at).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::contact::smooth::tests::{ball, cube};
+    use crate::mesh::Faces;
 
     fn of(surface: &Surface, radius: f64) -> Option<CornerSurface> {
         let query = SurfaceQuery::new(surface).expect("triangles");
@@ -98,6 +112,24 @@ mod tests {
     fn a_ball_has_no_corners_and_a_cube_has_eight() {
         assert!(of(&ball(24), 0.1).is_none());
         assert_eq!(of(&cube(), 0.1).expect("corners").corners.len(), 8);
+    }
+
+    /// Three ridges that meet between three valleys, `height` above and below the middle.
+    fn ridges(height: f64) -> Surface {
+        let around = (0..6).map(|k| {
+            let angle = f64::from(k) * TAU / 6.0;
+            DVec3::new(angle.cos(), angle.sin(), if k % 2 == 0 { height } else { -height })
+        });
+        let faces = (0..6).map(|k| [0, 1 + k, 1 + (k + 1) % 6]).collect();
+        Surface::new(std::iter::once(DVec3::ZERO).chain(around).collect(), Faces::Linear(faces)).expect("a surface")
+    }
+
+    #[test]
+    fn ridges_that_meet_in_a_saddle_are_no_corner() {
+        let surface = ridges(0.6);
+        let smooth = SmoothSurface::new(&surface);
+        let meet = smooth.convex_creases(&surface).filter(|crease| crease.nodes.contains(&0)).count();
+        assert_eq!((meet, convex_corners(&surface, &smooth)), (LEAST_CREASES, Vec::new()));
     }
 
     #[test]

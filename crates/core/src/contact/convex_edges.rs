@@ -14,7 +14,8 @@
 //! ```
 //!
 //! with `m` by the angle between the faces' normals. `t` and its derivative are continuous: over the edge `s_2` is negative where
-//! `s_1` passes zero. Shares of several edges multiply.
+//! `s_1` passes zero. Shares of several edges multiply. An edge may end where the surface becomes smooth, as creases on a rim do:
+//! beyond its end the share rises to one within a radius. Shorter edges than the radius do not count.
 //!
 //! *The body.* The closest point stops at the edge, and the gradient of the compliance `C(x)`, which inclines the force, would end
 //! there at once. So the compliance is taken at a point that slows down before the edge,
@@ -54,6 +55,9 @@ const LISTED: f64 = 1.0;
 const SAME_CHAIN: f64 = 0.7;
 /// Cosines between the normal of a foot and that of a face of an edge from which the edge counts, and counts fully.
 const FACING: [f64; 2] = [0.0, 0.5];
+/// Length over the sphere's radius from which an edge counts, and distances beyond its end from which it counts in part, and not.
+const SHORTEST: f64 = 1.0;
+const ENDING: [f64; 2] = [0.0, 1.0];
 /// Distance of another edge in about the same direction, over the radius, from which an edge counts.
 const ALONE: f64 = 2.0;
 /// Most edges beside which a sphere is at once; any others are not followed.
@@ -75,6 +79,8 @@ struct Edge {
     deficit: f64,
     /// Number of the edge; all its pieces have the same.
     chain: u32,
+    /// Whether the edge ends with each end of this piece.
+    is_last: [bool; 2],
 }
 
 /// Sharp convex edges of a surface, for a sphere.
@@ -160,8 +166,9 @@ impl Edge {
         self.distance_squared(foot) - SAME_DISTANCE * off.length_squared()
     }
 
-    /// Position of a sphere's centre with a foot across the edge.
-    fn across(&self, foot: &FootPoint, centre: DVec3, tolerance: f64) -> Across {
+    /// Position of the centre of a sphere of some radius, with a foot, across the edge.
+    fn across(&self, foot: &FootPoint, centre: DVec3, radius: f64) -> Across {
+        let tolerance = ON_EDGE * radius;
         let on_edge = foot.on_crease && self.distance_squared(foot.position) < tolerance * tolerance;
         if on_edge {
             let places = self.into.map(|into| (centre - self.ends[0]).dot(into));
@@ -171,8 +178,15 @@ impl Edge {
         let (mut places, mut slopes) = ([f64::NEG_INFINITY; 2], [DVec3::ZERO; 2]);
         places[face] = (foot.position - self.ends[0]).dot(self.into[face]);
         slopes[face] = foot.shift * self.into[face];
-        let (part, rise) = smooth_step(foot.normal.dot(self.normals[face]), FACING);
-        Across { places, slopes, face: Some(face), part, part_slope: foot.turning * self.normals[face] * rise }
+        let (mut part, rise) = smooth_step(foot.normal.dot(self.normals[face]), FACING);
+        let mut part_slope = foot.turning * self.normals[face] * rise;
+        for (k, outward) in [-self.along, self.along].into_iter().enumerate().filter(|&(k, _)| self.is_last[k]) {
+            let beyond = (foot.position - self.ends[k]).dot(outward) / radius;
+            let (gone, rate) = smooth_step(beyond, ENDING);
+            part_slope = part_slope * (1.0 - gone) - foot.shift * outward * (part * rate / radius);
+            part *= 1.0 - gone;
+        }
+        Across { places, slopes, face: Some(face), part, part_slope }
     }
 
     /// `rho` for a sphere of a radius.
@@ -237,6 +251,7 @@ impl ConvexEdges {
     pub fn new((surface, query, smooth): (&Surface, &SurfaceQuery, &SmoothSurface), radius: f64) -> Option<Self> {
         let mut edges = convex_edges(surface, smooth);
         keep_single(&mut edges, ALONE * radius);
+        keep_long(&mut edges, SHORTEST * radius);
         if edges.is_empty() {
             return None;
         }
@@ -261,7 +276,7 @@ impl ConvexEdges {
             });
             near = &near[count..];
             let Some(edge) = nearest else { continue };
-            let across = edge.across(foot, centre, ON_EDGE * self.radius);
+            let across = edge.across(foot, centre, self.radius);
             let beyond = across.face.is_some_and(|face| across.places[face] >= BESIDE[1] * self.radius);
             if beyond || across.part == 0.0 {
                 continue;
@@ -309,12 +324,19 @@ fn convex_edges(surface: &Surface, smooth: &SmoothSurface) -> Vec<Edge> {
         let into = [normals[0].cross(along), along.cross(normals[1])];
         let by_turn = (turn * (BY_TURN[0] + BY_TURN[1] * turn)).min(MOST_BY_TURN);
         let deficit = by_turn * (1.0 - LEAST_SHARE);
-        edges.push(Edge { ends, along, into, normals, deficit, chain: u32::MAX });
+        edges.push(Edge { ends, along, into, normals, deficit, chain: u32::MAX, is_last: [true; 2] });
         nodes.push(crease.nodes);
     }
     number_chains(&mut edges, &nodes);
     edges.sort_by_key(|edge| edge.chain);
     edges
+}
+
+/// Keeps edges that are no shorter than a length, m.
+fn keep_long(edges: &mut Vec<Edge>, length: f64) {
+    let mut lengths: BTreeMap<u32, f64> = BTreeMap::new();
+    edges.iter().for_each(|edge| *lengths.entry(edge.chain).or_default() += edge.ends[0].distance(edge.ends[1]));
+    edges.retain(|edge| lengths[&edge.chain] >= length);
 }
 
 /// Keeps edges without another one beside them: between two edges the body is a bar or a rim, not a wedge.
@@ -352,11 +374,18 @@ fn number_chains(edges: &mut [Edge], nodes: &[[u32; 2]]) {
         edges[first].chain = chains;
         let mut open = vec![first];
         while let Some(edge) = open.pop() {
-            for &other in nodes[edge].iter().flat_map(|node| &at_node[node]) {
-                let straight = edges[edge].along.dot(edges[other].along).abs() > SAME_CHAIN;
-                if edges[other].chain == u32::MAX && straight {
-                    edges[other].chain = chains;
-                    open.push(other);
+            for end in 0..2 {
+                let node = nodes[edge][end];
+                let away = |edge: usize| edges[edge].along * if nodes[edge][0] == node { 1.0 } else { -1.0 };
+                // Two pieces that leave a node in about the same direction are the sides of a rim.
+                let goes_on = |&&other: &&usize| away(edge).dot(away(other)) < -SAME_CHAIN;
+                let next: Vec<usize> = at_node[&node].iter().filter(goes_on).copied().collect();
+                edges[edge].is_last[end] = next.is_empty();
+                for other in next {
+                    if edges[other].chain == u32::MAX {
+                        edges[other].chain = chains;
+                        open.push(other);
+                    }
                 }
             }
         }
@@ -371,6 +400,7 @@ mod tests {
     use super::*;
     use crate::contact::smooth::DrawnSurface;
     use crate::contact::smooth::tests::{ball, cube, near};
+    use crate::mesh::Faces;
 
     #[test]
     fn a_ball_has_no_edges_and_a_cube_has_twelve() {
@@ -379,6 +409,33 @@ mod tests {
         let edges = of(&cube());
         assert_eq!(edges.iter().map(|edge| edge.chain).collect::<BTreeSet<_>>().len(), 12);
         assert!(edges.iter().all(|edge| (edge.deficit - (1.0 - LEAST_SHARE)).abs() < 1e-12));
+    }
+
+    /// A thin wedge of length 1: its top has two edges that leave the tip at 10 degrees.
+    fn wedge() -> Surface {
+        let [tip, left, right] = [DVec3::ZERO, DVec3::new(1.0, 0.09, 0.0), DVec3::new(1.0, -0.09, 0.0)];
+        let positions = [0.0, 1.0].iter().flat_map(|&z| [tip, left, right].map(|at| at + z * DVec3::Z)).collect();
+        let faces = vec![[0, 1, 2], [3, 5, 4], [0, 4, 1], [0, 3, 4], [0, 2, 5], [0, 5, 3], [1, 4, 5], [1, 5, 2]];
+        Surface::new(positions, Faces::Linear(faces)).expect("a surface")
+    }
+
+    #[test]
+    fn edges_that_leave_a_node_side_by_side_are_two_and_end_there() {
+        let surface = wedge();
+        let edges = convex_edges(&surface, &SmoothSurface::new(&surface));
+        let on_top = |edge: &&Edge| edge.ends.iter().all(|end| end.z == 1.0) && edge.ends.contains(&DVec3::Z);
+        let sides: Vec<&Edge> = edges.iter().filter(on_top).collect();
+        assert_eq!(sides.len(), 2);
+        assert_ne!(sides[0].chain, sides[1].chain);
+        assert!(sides.iter().all(|edge| edge.is_last == [true; 2]));
+    }
+
+    #[test]
+    fn short_edges_do_not_count() {
+        let (surface, smooth) = (cube(), SmoothSurface::new(&cube()));
+        let query = SurfaceQuery::new(&surface).expect("triangles");
+        let count = |radius: f64| ConvexEdges::new((&surface, &query, &smooth), radius).is_some();
+        assert!(count(0.45) && !count(1.01));
     }
 
     /// Along a way from the top over an edge to the side, and near a corner.
