@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from benches.strain.refined import refined
 
 import palpate
+from benches.strain.refined import refined
 from palpate.mesh.triangles import node_normals
 from palpate.validation.verify.contact.loop import loop_of, sphere
 
