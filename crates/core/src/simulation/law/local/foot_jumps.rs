@@ -115,20 +115,19 @@ fn begin_fading(model: &Model, contact: &mut Contact) {
     fix_on_plane(&model.tools[contact.tool], contact, -1.0 / FADE_TICKS);
 }
 
-/// Fixes a contact on a plane that is normal to its force. Under a sphere its approach becomes that at which the half-space presses
-/// back by the whole force, so that the force at the same position stays the same: it grows with the power 3/2 of the approach, and
-/// what inclined it came from the gradients along the surface.
+/// Fixes a contact on a plane. Under a sphere this is normal to the force, and the approach to it is the contact's own: the energy stays
+/// the same, and the force keeps its direction and becomes that of the half-space alone. With an approach that keeps the whole force
+/// too, the energy would rise by up to nine tenths, and passivity would take it back at once.
 fn fix_on_plane(tool: &ToolModel, contact: &mut Contact, part_rate: f64) {
     let local = &mut contact.local;
     let push = -(local.force - local.friction.force());
     let straight = push.dot(local.foot.normal);
     (local.is_fading, local.part_rate, local.plane_normal) = (true, part_rate, local.foot.normal);
+    local.foot = local.foot.frozen(local.relative_position);
     if straight > 0.0 && !tool.shape.needs_cells() {
         (local.plane_normal, local.offset) = (push.normalize(), DVec3::ZERO);
-        let approach = local.penetration;
-        local.entry_depth = 0.0;
         let depth = contact_depth(tool, contact, contact.local.relative_position);
-        contact.local.entry_depth = depth - approach;
+        contact.local.entry_depth = depth - contact.local.penetration;
     }
 }
 
