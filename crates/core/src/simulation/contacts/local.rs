@@ -15,9 +15,8 @@ pub struct LocalContact {
     pub orientation: DQuat,
     /// Position of the tool over the surface at rest, `p' = p - u`, without the displacement `u` of the body below it, m.
     pub relative_position: DVec3,
-    /// Way of the tool in this tick, m, and the part of it along the contact's plane, m.
-    pub travel: f64,
-    pub travel_along: f64,
+    /// Way of the tool in this tick, m.
+    pub way: DVec3,
     /// Displacement of that position in the last tick, m.
     pub last_step: DVec3,
     /// Orientation a tick ago.

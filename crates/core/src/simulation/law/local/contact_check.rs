@@ -4,8 +4,7 @@
 //! modulus of the body's surface. A contact lies on its body, and no farther from its tool than that reaches. A contact that
 //! violates this is an error of the method.
 
-use super::depth_below;
-use crate::contact::shape::ToolShape;
+use super::foot_jumps::contact_depth;
 use crate::simulation::contacts::Contact;
 use crate::simulation::model::Model;
 
@@ -23,15 +22,7 @@ pub fn is_sound(model: &Model, contact: &Contact, stiffness_scale: f64) -> bool 
     let (body, tool) = (&model.bodies[contact.body], &model.tools[contact.tool]);
     let Some(own) = &body.local else { return true };
     let size = tool.shape.bounding_radius();
-    let depth = match tool.shape {
-        ToolShape::Sphere { radius } => radius - (local.relative_position - local.foot.position).dot(local.normal()),
-        ref shape => {
-            let pose = (local.relative_position, glam::DMat3::from_quat(local.orientation));
-            depth_below(shape, pose, &local.foot)
-        }
-    }
-    .max(local.penetration)
-    .max(0.0);
+    let depth = contact_depth(tool, contact, local.relative_position).max(local.penetration).max(0.0);
     let [low, high] = own.bounds.map(|corner| corner - contact.point);
     let on_body = low.max_element() <= MARGIN_OUTSIDE * size && high.min_element() >= -MARGIN_OUTSIDE * size;
     // A contact that fades (`foot_jumps`) stays at its place while its tool moves on.
@@ -49,6 +40,7 @@ mod tests {
 
     use super::*;
     use crate::contact::Moduli;
+    use crate::contact::shape::ToolShape;
     use crate::green::{Precision, precompute};
     use crate::simulation::contact_check::is_sound;
     use crate::simulation::law::bodies;

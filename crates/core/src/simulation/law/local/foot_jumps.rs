@@ -75,15 +75,16 @@ pub fn replace_jumped_contacts(model: &Model, state: &mut State, solved: SolvedC
     let mut any = false;
     for (a, &slot) in slots.iter().enumerate() {
         let (response, place) = (&solved.responses[a], solved.positions[a]);
-        let contact = state.contacts.slots[slot];
+        let contact = &state.contacts.slots[slot];
         // One without a force whose foot comes to that of another would be the other once more.
         let is_double = contact.additional
             && contact.local.force == DVec3::ZERO
             && contact_at_same_foot(model, state, solved, slots, a).is_some();
-        if !is_double && !foot_has_jumped(model, &contact, response, place) {
+        if !is_double && !foot_has_jumped(model, contact, response, place) {
             continue;
         }
         any = true;
+        let contact = *contact;
         if contact.local.force == DVec3::ZERO {
             match contact.additional {
                 true => state.contacts.clear(slot),
@@ -231,8 +232,9 @@ pub fn update_parts(model: &Model, state: &mut State, responses: &[LocalResponse
             let whole = responses[a].indentation.energy / local.part;
             let bound = if whole > 0.0 { state.tools[tool].released_energy / whole } else { f64::INFINITY };
             // The plane of a fading contact has no end, but the body has: the contact fades faster, the faster its tool moves.
-            let travel = if local.part_rate == 0.0 { local.travel_along } else { local.travel };
-            let left_behind = if local.is_fading { travel / model.tools[tool].radius } else { 0.0 };
+            let along = || local.way.reject_from_normalized(local.foot.normal);
+            let way = if local.part_rate == 0.0 { along() } else { local.way };
+            let left_behind = if local.is_fading { way.length() / model.tools[tool].radius } else { 0.0 };
             let part = (local.part + (local.part_rate - left_behind).min(bound)).clamp(LEAST_PART, 1.0);
             state.tools[tool].released_energy += (local.part - part) * whole;
             let local = &mut state.contacts.slots[slot].local;

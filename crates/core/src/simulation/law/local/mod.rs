@@ -277,8 +277,7 @@ impl Law for Local {
         if approach.motion.is_none() {
             local.last_step = local.last_step.clamp_length_max(STEP_PER_MOTION * travel);
         }
-        (local.tool_position, local.orientation, local.travel) = (approach.position, approach.orientation, travel);
-        local.travel_along = way.reject_from_normalized(local.foot.normal).length();
+        (local.tool_position, local.orientation, local.way) = (approach.position, approach.orientation, way);
         // After a jump a new contact starts from the depth stored in the tool's state.
         !approach.grab && !has_jumped
     }
