@@ -20,6 +20,8 @@ from palpate.validation.verify.contact.loop import UNLIMITED, sphere
 # Nodes of the built-in kidney at which the force was lost, the last two in the hollow of its hilum; R, m.
 NODES, RADIUS = (364, 2024, 2602, 2721, 277, 2050), 8e-3
 HOLLOW = NODES[-1]
+# Node in a rough part of the hollow, in which the tool would snap 8 mm to the side within a tick.
+ROUGH = 2265
 DEEP, TICK, START = 1.5, 20e-6, 0.5e-3
 # Surface that may be touched, over the radius.
 AROUND = 4.0
@@ -107,6 +109,16 @@ def test_a_press_between_two_walls_beside_a_direct_solution():
     expected = solved_directly(HOLLOW, HOLLOW_DEPTHS)
     error = np.interp(HOLLOW_DEPTHS, depths, along) / expected - 1
     assert np.all(np.abs(error) < HOLLOW_TOLERANCE), (expected, error)
+
+
+@pytest.mark.filterwarnings("ignore::palpate.TouchWarning")
+@pytest.mark.parametrize("law", ["linear", "neo-hookean"])
+def test_no_force_rises_at_once_in_a_rough_hollow(law):
+    """A tool that would snap far to the side stays on the plane where it was."""
+    forces = pressed(ROUGH, law)[1]
+    largest = np.linalg.norm(forces, axis=1).max()
+    assert 0.8 < largest < 2.0
+    assert np.diff(np.linalg.norm(forces, axis=1)).max() < JUMP * largest
 
 
 def test_a_force_that_is_lost_is_seen():

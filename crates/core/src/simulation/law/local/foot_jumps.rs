@@ -40,6 +40,8 @@ const JUMP_DISTANCE: f64 = 0.02;
 /// Largest distance of a replacement from the old foot, over the tool's radius, and least cosine between their normals.
 const REPLACEMENT_DISTANCE: f64 = 0.25;
 const SAME_SIDE: f64 = 0.3;
+/// Longest snap of a tool over the surface at rest, over its radius. At the next place the force may be twice as large.
+const LONGEST_SNAP: f64 = 0.25;
 /// Feet closer than this, over the tool's radius, have merged.
 const MERGED_DISTANCE: f64 = 0.02;
 /// Planes of a tool that is not a sphere have merged if the cosine between their normals is larger than this.
@@ -147,6 +149,28 @@ pub fn fix_lost_contacts(model: &Model, state: &mut State, steps: &[DVec3], slot
             false => fix_on_plane(&model.tools[contact.tool], contact, 0.0),
         }
     }
+}
+
+/// Fixes contacts on their planes whose tools would snap farther over the surface at rest, away from sharp edges, than
+/// [`LONGEST_SNAP`]. Returns whether there were any.
+pub fn fix_snapping_contacts(model: &Model, state: &mut State, solved: SolvedContacts<'_>, slots: &[usize]) -> bool {
+    let mut any = false;
+    for (a, &slot) in slots.iter().enumerate() {
+        let contact = &state.contacts.slots[slot];
+        let (local, tool) = (&contact.local, &model.tools[contact.tool]);
+        let new = local.is_new || local.is_fading || local.force == DVec3::ZERO;
+        if new || tool.shape.needs_cells() || share_of_contact(model, contact) == 1.0 {
+            continue;
+        }
+        let snap = solved.positions[a].distance(local.relative_position) - local.way.length();
+        let edges = model.convex_edges[contact.tool][contact.body].as_deref();
+        let rounds = edges.is_some_and(|edges| edges.are_beside_one(&local.foot, &solved.responses[a].foot));
+        if snap > LONGEST_SNAP * tool.radius && !rounds {
+            fix_on_plane(tool, &mut state.contacts.slots[slot], 0.0);
+            any = true;
+        }
+    }
+    any
 }
 
 /// Whether a contact on its plane has faded so little that its tool begins no other one.

@@ -13,8 +13,8 @@ use super::additional::other_planes;
 use super::coupling::{blend_patch, couple};
 use super::energy_surplus::{commit_energy, observe_energy, remove_energy_surplus};
 use super::foot_jumps::{
-    SolvedContacts, contact_depth, continue_contact, fade_merged_contacts, fix_lost_contacts, foot_has_jumped,
-    replace_jumped_contacts, update_parts,
+    SolvedContacts, contact_depth, continue_contact, fade_merged_contacts, fix_lost_contacts, fix_snapping_contacts,
+    foot_has_jumped, replace_jumped_contacts, update_parts,
 };
 use super::force_error::{ForceError, estimate};
 use super::half_space::LocalTool;
@@ -121,6 +121,10 @@ pub fn local_forces(model: &Model, state: &mut State, mut memory: TickMemory<'_>
         }
         let (responses, positions) = (&memory.local.responses, &memory.local.positions);
         let solved = SolvedContacts { responses, positions };
+        if !last && fix_snapping_contacts(model, state, solved, slots) {
+            last = true;
+            continue;
+        }
         if last || !replace_jumped_contacts(model, state, solved, slots) {
             let energy = observe_energy(model, state, memory.local, slots, body);
             if last || !remove_energy_surplus(model, state, memory.local, slots, energy) {
