@@ -69,14 +69,7 @@ def cached_files() -> list[CachedFile]:
 
 
 def chosen_files(name: str) -> list[CachedFile]:
-    """Files of the cache by name, or by the beginning of it.
-
-    Raises
-    ------
-    StoreError
-        There are none.
-
-    """
+    """Files of the cache by name, or by the beginning of it; StoreError if there are none."""
     files = cached_files()
     chosen = [file for file in files if name in (file.name, file.path.name, str(file.path))]
     chosen = chosen or [file for file in files if file.path.name.startswith(name) and name]

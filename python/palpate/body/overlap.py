@@ -19,13 +19,8 @@ BLOCK = 4096
 def require_apart(mesh: TetMesh, labels: np.ndarray) -> None:
     """Refuse parts, given by the label (n,) of each node, if one reaches into another.
 
-    Looked at are the nodes and the middles of the elements of each part.
-
-    Raises
-    ------
-    BodyError
-        Two parts that overlap, with a place at which they do.
-
+    Looked at are the nodes and the middles of the elements of each part. Raises BodyError for two parts that overlap,
+    with a place at which they do.
     """
     corners = mesh.tets[:, :4]
     of_element = labels[corners[:, 0]]

@@ -38,11 +38,7 @@ class StrainLaw:
     def terms(self, poissons_ratio: float) -> np.ndarray:
         """Return the three coefficients of a sphere's contact at finite strain.
 
-        Raises
-        ------
-        BodyError
-            A material that the table of coefficients does not reach.
-
+        Raises BodyError for a material that the table of coefficients does not reach.
         """
         if self.name == "linear":
             return np.zeros(3)
@@ -67,11 +63,7 @@ def _range_of(name: str) -> str:
 def strain_law(name: str, constants: dict[str, float | None]) -> tuple[StrainLaw, float | None]:
     """Return the law and the shear modulus at small strain, Pa, which a law without constants leaves open.
 
-    Raises
-    ------
-    BodyError
-        A law that is unknown, or constants that are missing, negative in sum or those of another law.
-
+    Raises BodyError for a law that is unknown, or constants that are missing, negative in sum or those of another law.
     """
     if name not in CONSTANTS:
         raise BodyError(f"law must be one of {', '.join(map(repr, CONSTANTS))}, got {brief_repr(name)}")

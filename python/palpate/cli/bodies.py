@@ -112,11 +112,7 @@ def is_surface(path: Path) -> bool:
 def segment_tables(typed: Sequence[str] | None) -> list[dict[str, str]]:
     """Tables ``[[body.segment]]`` of what was typed, such as ``liver`` or ``tumor=40kPa``.
 
-    Raises
-    ------
-    UnitError
-        A modulus that is no positive pressure.
-
+    Raises UnitError for a modulus that is no positive pressure.
     """
     from palpate.errors import UnitError
     from palpate.units import pressure
@@ -175,11 +171,8 @@ def read_any(
 ) -> TetMesh:
     """Read a volume mesh, or fill a surface; ``drawn`` takes the boundary of a segmentation before it is filled.
 
-    Raises
-    ------
-    MeshError
-        A file that cannot be read or filled, or one of 10-node tetrahedra where 4-node ones are asked for.
-
+    Raises MeshError for a file that cannot be read or filled, or one of 10-node tetrahedra where 4-node ones are asked
+    for.
     """
     from palpate.errors import MeshError
     from palpate.mesh import TetMesh
@@ -205,14 +198,7 @@ def read_any(
 def body_of(
     mesh: TetMesh, material: Material | Mapping[int | str, Material], fix: str, loads: Loads | None = None
 ) -> Body:
-    """Body that is held where a predicate says.
-
-    Raises
-    ------
-    BodyError
-        A predicate that holds nowhere.
-
-    """
+    """Body that is held where a predicate says; BodyError for a predicate that holds nowhere."""
     from palpate.body import Body, parse
     from palpate.errors import BodyError
 

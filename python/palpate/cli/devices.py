@@ -64,14 +64,7 @@ def devices(
 
 
 def _choose_device(found: list[Listing], id: str | None) -> tuple[str, str | None]:
-    """Kind and identity of the device to be checked.
-
-    Raises
-    ------
-    DeviceError
-        None, or one that cannot be opened: why.
-
-    """
+    """Kind and identity of the device to be checked; DeviceError if there is none, or why it cannot be opened."""
     from palpate.errors import DeviceError
 
     if id is not None:

@@ -54,14 +54,7 @@ class RunOptions:
     device: tuple[str, ...] | None = None
 
     def refuse(self, file: Path, allowed: set[str], reason: str, of_loop: bool = True) -> None:
-        """Refuse options that the kind of file does not take.
-
-        Raises
-        ------
-        SceneError
-            The first of them, and why.
-
-        """
+        """Refuse options that the kind of file does not take; SceneError says which is the first of them, and why."""
         for field in fields(self):
             if getattr(self, field.name) is not None and field.name not in (allowed | OF_LOOP if of_loop else allowed):
                 raise SceneError(f"{file}: {FLAGS[field.name]} is not for this file: {reason}")
@@ -104,13 +97,8 @@ def built_from(
 ) -> BuiltScene:
     """Scene of a file, ready to run; what is computed on beside it goes into ``growing``, if there is one.
 
-    ``drawn`` takes the boundary of a segmentation, vertices, m, and triangles, before it is filled.
-
-    Raises
-    ------
-    Error
-        A file that cannot be read, filled or solved, or an option that does not belong to it.
-
+    ``drawn`` takes the boundary of a segmentation, vertices, m, and triangles, before it is filled. Raises Error for a
+    file that cannot be read, filled or solved, or an option that does not belong to it.
     """
     from palpate.progress import status_line
     from palpate.scene import Scene

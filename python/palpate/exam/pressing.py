@@ -42,11 +42,7 @@ class Places:
 def places_of(exam: ExamFile, mesh: TetMesh, touchable: np.ndarray) -> Places:
     """Places of an exam, listed or drawn, on the faces whose corners may all be touched.
 
-    Raises
-    ------
-    SceneError
-        No such faces, or a box in which so many random places do not fit.
-
+    Raises SceneError for no such faces, or a box in which so many random places do not fit.
     """
     triangles = mesh.surface_triangles
     triangles = triangles[np.isin(triangles, touchable).all(axis=1)]

@@ -170,11 +170,7 @@ class Presses:
 def _to_press(scene: Scene, measured: Indentations) -> Scene:
     """Scene as it is pressed: its first tool alone, of the measured radius, without the limit of strain.
 
-    Raises
-    ------
-    FitError
-        A scene that has no static law of its material alone.
-
+    Raises FitError for a scene that has no static law of its material alone.
     """
     if len(scene.bodies) > 1:
         raise FitError("the scene has several bodies: fit one at a time")

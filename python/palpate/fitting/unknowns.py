@@ -170,11 +170,7 @@ class Unknowns:
 def chosen_to_fit(unknowns: Unknowns, hold: Sequence[str]) -> list[Unknown]:
     """Return the unknowns that are not held by name, or by the last part of it.
 
-    Raises
-    ------
-    FitError
-        A name that there is not, or nothing left.
-
+    Raises FitError for a name that there is not, or nothing left.
     """
     names = {u.name for u in unknowns.all}
     for name in hold:

@@ -48,14 +48,7 @@ class DiskUse:
 
 
 def require_room(target: Path, columns: int, rows: int, precision: str, in_stages: bool) -> None:
-    """Refuse a precomputation whose files have no room beside ``target``, and say what would.
-
-    Raises
-    ------
-    StoreError
-        With the numbers.
-
-    """
+    """Raise StoreError if the files of a precomputation have no room beside ``target``, and say what would."""
     free = free_bytes(target)
     needed = DiskUse.of(columns, rows, precision, in_stages)
     if needed.peak <= free:

@@ -64,14 +64,7 @@ class Job:
         first: SurfaceRegion | None,
         path: str | os.PathLike[str] | None,
     ) -> Job:
-        """Check everything that can be checked before a number is computed.
-
-        Raises
-        ------
-        Error
-            See :func:`palpate.precompute`.
-
-        """
+        """Check everything that can be checked before a number is computed; errors as of :func:`palpate.precompute`."""
         if not isinstance(body, Body):
             raise BodyError(f"precompute takes a palpate.Body, got {brief_repr(body)}")
         body.require_supported()
@@ -127,14 +120,7 @@ class Job:
         return GreensFunction(_native.GreenCore.load(self.target), self.body)
 
     def allowed(self, memory: int | str | None) -> int | None:
-        """Bytes of memory that may be taken, once the files have room.
-
-        Raises
-        ------
-        Error
-            They have not, or nothing is left of the memory.
-
-        """
+        """Bytes of memory that may be taken, once the files have room; Error if they have not, or no memory is left."""
         in_stages = 0 < len(self.first) < len(self.region)
         require_room(self.target, 3 * len(self.region), self.rows, self.precision or "f16", in_stages)
         return available_memory() if memory is None else allowed_memory(memory)

@@ -37,11 +37,7 @@ def available_memory() -> int | None:
 def allowed_memory(limit: int | str) -> int:
     """Bytes that may still be taken when the process as a whole may reach ``limit`` bytes, or text such as ``"8GB"``.
 
-    Raises
-    ------
-    BodyError
-        Nothing is left.
-
+    Raises BodyError if nothing is left.
     """
     total, used = memory_units(limit), memory_in_use()
     if not total > used:

@@ -82,15 +82,8 @@ class SeriesJob:
         """Read the series from its file, and compute and store what is missing there.
 
         One process at a time computes it, the others wait. With ``dask`` the workers of a cluster compute, as in
-        :func:`palpate.precompute`.
-
-        Raises
-        ------
-        BodyError
-            A body that is not held.
-        ClusterError
-            A cluster that cannot be reached, has no workers or other versions, or fails.
-
+        :func:`palpate.precompute`. Raises BodyError for a body that is not held; ClusterError for a cluster that cannot
+        be reached, has no workers or other versions, or fails.
         """
         file = self.file()
 
@@ -168,14 +161,7 @@ def lines_of_series(store: Path) -> Iterator[str]:
 
 
 def series_line(path: Path) -> str:
-    """One line about a file of series, for people.
-
-    Raises
-    ------
-    StoreError
-        A file that is damaged or of another version.
-
-    """
+    """One line about a file of series, for people; StoreError for a file that is damaged or of another version."""
     series = _native.Series.read(path)
     done = "all" if series.is_complete else f"{series.done:,} of"
     return f"series beyond small strain at {done} {series.places:,} places, {path.stat().st_size / 1e6:.2g} MB"

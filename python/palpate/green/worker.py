@@ -138,11 +138,7 @@ def measure(problem: Arrays, job: FactorRequest) -> tuple[tuple[Any, ...], bytes
 def solve(problem: Arrays, job: FactorRequest, order: bytes, block: int, width: int) -> tuple[bytes, bytes]:
     """Panel of a block of ``width`` columns, and its checksum.
 
-    Raises
-    ------
-    ClusterError
-        This machine orders rows and columns otherwise: its blocks are of other columns.
-
+    Raises ClusterError if this machine orders rows and columns otherwise: its blocks are of other columns.
     """
     factor = _factorize(problem, job)
     _require_order(factor.order, order, "columns")
@@ -152,11 +148,7 @@ def solve(problem: Arrays, job: FactorRequest, order: bytes, block: int, width: 
 def solve_series(problem: Arrays, job: SeriesRequest, order: bytes, block: int) -> tuple[bytes, bytes]:
     """Coefficients of a series at a block of places, and their checksum.
 
-    Raises
-    ------
-    ClusterError
-        This machine orders the places otherwise.
-
+    Raises ClusterError if this machine orders the places otherwise.
     """
     require_version(job.version, _address())
     factor = _factors.get(job.key, lambda: _native.SeriesBlocks(problem, job.laws, job.radius, threads()))

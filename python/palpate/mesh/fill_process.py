@@ -80,11 +80,7 @@ class FillProcess:
     def mesh(self, require_wanted: Callable[[], None] = lambda: None) -> TetMesh:
         """Fill the file; ``require_wanted`` is called ten times a second, and ends the process by raising.
 
-        Raises
-        ------
-        MeshError
-            A file that cannot be read or filled, and why.
-
+        Raises MeshError for a file that cannot be read or filled, and why.
         """
         report = self.folder / REPORT
         for left in (report, self.folder / SURFACE, self.folder / MESH):

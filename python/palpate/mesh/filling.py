@@ -81,14 +81,7 @@ class Filling:
         return float(np.ptp(self.shape.vertices, axis=0).max())
 
     def mesh(self) -> TetMesh:
-        """Fill the surface.
-
-        Raises
-        ------
-        MeshError
-            A mesher that failed, or a mesh that loses a part of the body, and why.
-
-        """
+        """Fill the surface; MeshError for a mesher that failed, or a mesh that loses a part of the body, and why."""
         size = self.extent / PARTS[self.job.element] if self.job.size is None else self.job.size
         halvings = self._halvings(size)
         found: tuple[TetMesh, Fit] | None = None

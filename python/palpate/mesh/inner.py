@@ -74,14 +74,7 @@ class InnerRegions:
         return TetMesh(mesh.nodes, mesh.tets, counts.argmax(axis=0), self.names())
 
     def require_elements(self, name: str, mesh: TetMesh) -> None:
-        """Refuse a mesh in which a region has no element.
-
-        Raises
-        ------
-        MeshError
-            The first of them.
-
-        """
+        """Raise MeshError with the first region that has no element in a mesh."""
         there = set(np.unique(mesh.regions).tolist())
         for title, number in self.names().items():
             if number not in there:

@@ -49,11 +49,7 @@ class SurfaceFile:
 def load_surface(surface: str | os.PathLike[str] | trimesh.Trimesh | SurfaceFile) -> SurfaceFile:
     """Read a file, or take a surface of a program, or one that was read.
 
-    Raises
-    ------
-    MeshError
-        A file that is missing, cut short, cannot be read, or holds no triangles.
-
+    Raises MeshError for a file that is missing, cut short, cannot be read, or holds no triangles.
     """
     import trimesh
 

@@ -107,14 +107,7 @@ class SurfaceState:
 
 
 def require_closed(name: str, shape: trimesh.Trimesh, hint: str = BY_HAND) -> SurfaceState:
-    """State of a closed surface of one part, its volume positive.
-
-    Raises
-    ------
-    MeshError
-        A surface that is not, and why.
-
-    """
+    """State of a closed surface of one part, its volume positive; MeshError for any other, and why."""
     require_finite(name, shape)
     state = SurfaceState.of(shape)
     fault = state.fault()

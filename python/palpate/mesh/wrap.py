@@ -87,11 +87,7 @@ class Wrap:
 def wrap(field: SolidField, labels: np.ndarray, part: int | None, cells: int) -> Wrap:
     """Wrap a part by its rank, or all of them (None), on a grid of so many cells or more along the longest side.
 
-    Raises
-    ------
-    WrapError
-        Triangles without an inside, or fewer parts.
-
+    Raises WrapError for triangles without an inside, or fewer parts.
     """
     moved = SIMPLIFIED / cells
     while True:
@@ -129,14 +125,7 @@ def _wrap(field: SolidField, labels: np.ndarray, part: int | None, cells: int, m
 
 
 def _require_one_side(field: SolidField, cell: float) -> None:
-    """Refuse a sheet: what it encloses lies on both of its sides.
-
-    Raises
-    ------
-    WrapError
-        With the reason.
-
-    """
+    """Raise WrapError for a sheet: what it encloses lies on both of its sides."""
     points, normals = field.samples(SAMPLES)
     before, behind = (field.winding(points + sign * 0.05 * cell * normals) > 0.5 for sign in (1, -1))
     bounding = before != behind

@@ -71,12 +71,8 @@ class Wrapping:
     def mesh(self) -> TetMesh:
         """Fill what the surface encloses.
 
-        Raises
-        ------
-        MeshError
-            A surface without an inside, a part that is not there, a mesher that failed, or a mesh that loses more of
-            the volume than allowed.
-
+        Raises MeshError for a surface without an inside, a part that is not there, a mesher that failed, or a mesh that
+        loses more of the volume than allowed.
         """
         points = np.asarray(self.surface.shape.vertices)
         origin, extent = points.min(axis=0), float(np.ptp(points, axis=0).max())

@@ -58,11 +58,7 @@ class Link:
     def take(self, peer: object, message: Message, now: float) -> bytes | None:
         """Do what a message says; an answer for its peer alone, or None. What Palpate does not know is left alone.
 
-        Raises
-        ------
-        MessageError
-            A message whose content is wrong.
-
+        Raises MessageError for a message whose content is wrong.
         """
         simulation = self._simulation()
         if message.kind == "TRANSFORM" and message.device == BODY:

@@ -49,14 +49,7 @@ class Protocol:
 
     @classmethod
     def of(cls, spacing: float | str, depth: float | str, speed: float | str, strokes: bool) -> Protocol:
-        """From numbers in SI, or text with units.
-
-        Raises
-        ------
-        Error
-            A number that is not positive, or no quantity.
-
-        """
+        """Take numbers in SI, or text with units; Error for a number that is not positive, or no quantity."""
         given = {"grid": units.length(spacing), "depth": units.length(depth), "speed": units.speed(speed)}
         for name, value in given.items():
             if not (np.isfinite(value) and value > 0):
@@ -66,11 +59,7 @@ class Protocol:
     def check(self, simulation: Simulation) -> None:
         """Refuse what the first tool of a scene cannot do.
 
-        Raises
-        ------
-        SceneError
-            A depth beyond the tool's own radius, or a speed at which a press has too few ticks.
-
+        Raises SceneError for a depth beyond the tool's own radius, or a speed at which a press has too few ticks.
         """
         tool, rate = simulation.scene.tools[0], simulation.scene.device.rate
         if 0 < tool.reach <= self.depth:
@@ -169,11 +158,7 @@ class Selection:
 def sample_sites(simulation: Simulation, protocol: Protocol, on: str | None) -> Sites:
     """Points about a spacing apart on all bodies of a scene, where a predicate holds in the body's own frame.
 
-    Raises
-    ------
-    SceneError
-        A spacing wider than every body, one that is far too small, or no point at all.
-
+    Raises SceneError for a spacing wider than every body, one that is far too small, or no point at all.
     """
     selection = Selection(simulation, protocol, on)
     found = []
@@ -194,11 +179,7 @@ def sample_sites(simulation: Simulation, protocol: Protocol, on: str | None) -> 
 def sites_at_points(simulation: Simulation, points: Sequence[Any]) -> Sites:
     """Points that are given, in the scene, m, moved onto the closest surface.
 
-    Raises
-    ------
-    SceneError
-        Something else than points, or one that is far from every body.
-
+    Raises SceneError for something else than points, or one that is far from every body.
     """
     asked = np.array([three_numbers(point, "a point of a palpation", SceneError, units.length) for point in points])
     if len(asked) == 0:

@@ -88,11 +88,7 @@ def slope_of_passes(forces: np.ndarray, protocol: Protocol) -> np.ndarray:
 def strokes_on(simulation: Simulation, protocol: Protocol, on: str | None) -> tuple[Sites, list[np.ndarray]]:
     """Places of strokes over all bodies, and which of them (k,) each stroke visits, in order.
 
-    Raises
-    ------
-    SceneError
-        A spacing wider than every body, no stroke, or a tool that sticks.
-
+    Raises SceneError for a spacing wider than every body, no stroke, or a tool that sticks.
     """
     law = simulation.scene.tools[0].contact
     if law != "local":

@@ -131,27 +131,15 @@ def marked_as_growing(built: BuiltScene, growing: Mapping[int, BackgroundPrecomp
 
 
 def mesh_of_body(scene: SceneTables, rank: int = 0) -> TetMesh:
-    """Mesh of a body of a scene, read or made from its surface.
-
-    Raises
-    ------
-    Error
-        A file that cannot be read or filled.
-
-    """
+    """Mesh of a body of a scene, read or made from its surface; Error for a file that cannot be read or filled."""
     return _Builder(scene, rank).mesh()
 
 
 def unsolved_body(scene: SceneTables, rank: int = 0, mesh: TetMesh | None = None) -> Body:
     """Mesh of a body of a scene with its materials, supports and loads, before anything is computed of it.
 
-    ``mesh`` is that of :func:`mesh_of_body`, where it is known.
-
-    Raises
-    ------
-    Error
-        A mesh that cannot be read or made, a region or supports that hold nothing.
-
+    ``mesh`` is that of :func:`mesh_of_body`, where it is known. Raises Error for a mesh that cannot be read or made, a
+    region or supports that hold nothing.
     """
     return _Builder(scene, rank).body(mesh)
 

@@ -80,11 +80,7 @@ class DynamicsTable(Table):
     def build(self, body: Body, max_stiffness: float, progress: bool | Callable[[int, int], None] = True) -> BodyMotion:
         """Modes and coefficients for a body.
 
-        Raises
-        ------
-        Error
-            A coupling stiffer than the device renders, an unstable scheme, more modes than there are.
-
+        Raises Error for a coupling stiffer than the device renders, an unstable scheme, more modes than there are.
         """
         coupling = max_stiffness if self.coupling is None else self.coupling
         if coupling > max_stiffness:

@@ -50,11 +50,7 @@ class Expected:
     ) -> Expected:
         """Look for the store of a body, or plan it, with the arguments of :func:`palpate.plan`.
 
-        Raises
-        ------
-        Error
-            A body that cannot be computed, or files without room.
-
+        Raises Error for a body that cannot be computed, or files without room.
         """
         counts = len(body.mesh.nodes), len(body.mesh.surface_nodes)
         if Job.of(body, precision, touch, first, None).stored() is not None:

@@ -47,11 +47,7 @@ class Boundaries:
 def boundaries(labels: LabelMap, wanted: Sequence[str | int]) -> Boundaries:
     """Boundaries of segments by their names.
 
-    Raises
-    ------
-    MeshError
-        A segment that is not there, that has no voxel, or that later ones cover.
-
+    Raises MeshError for a segment that is not there, that has no voxel, or that later ones cover.
     """
     segments = labels.choose(wanted)
     masks = [labels.mask(segment) for segment in segments]

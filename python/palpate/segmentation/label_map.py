@@ -63,13 +63,8 @@ class LabelMap:
     def find(self, wanted: str | int) -> Segment:
         """Find a segment by its name, or by its label where no name fits.
 
-        Letters may be large or small if only one name fits then.
-
-        Raises
-        ------
-        MeshError
-            There is none, or there are several; the message has the names in the file.
-
+        Letters may be large or small if only one name fits then. Raises MeshError, with the names in the file, if there
+        is none, or if there are several.
         """
         text = str(wanted)
         exact = [s for s in self.segments if s.name == text]
@@ -87,11 +82,7 @@ class LabelMap:
     def choose(self, wanted: Sequence[str | int]) -> tuple[Segment, ...]:
         """Find several segments; without a name the only one of the file.
 
-        Raises
-        ------
-        MeshError
-            A segment that is not there or is given twice, or no name where the file has several.
-
+        Raises MeshError for a segment that is not there or is given twice, or no name where the file has several.
         """
         if not wanted:
             if len(self.segments) == 1:

@@ -42,11 +42,7 @@ class _Decompressor(Protocol):
 def read_nrrd(path: Path) -> RawImage:
     """Read a label map.
 
-    Raises
-    ------
-    MeshError
-        A file that is damaged or cut short, one without a space, or of another number of dimensions.
-
+    Raises MeshError for a file that is damaged or cut short, one without a space, or of another number of dimensions.
     """
     with path.open("rb") as file:
         header = _header(path, file)

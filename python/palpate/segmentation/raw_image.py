@@ -41,11 +41,7 @@ class RawImage:
 def require_size(path: Path, sizes: Sequence[int], dtype: np.dtype) -> None:
     """Refuse an image that is too large by its header, before anything of it is read.
 
-    Raises
-    ------
-    MeshError
-        More than ``MOST_BYTES``.
-
+    Raises MeshError for more than ``MOST_BYTES``.
     """
     size = dtype.itemsize
     for count in sizes:

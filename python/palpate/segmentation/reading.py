@@ -60,14 +60,7 @@ def load_label_map(path: str | os.PathLike[str], unit: str | None = None) -> Lab
 
 
 def _labels(path: Path, raw: RawImage) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Voxels as whole numbers, and the labels in each layer.
-
-    Raises
-    ------
-    MeshError
-        An intensity image.
-
-    """
+    """Voxels as whole numbers, and the labels in each layer; MeshError for an intensity image."""
     voxels = raw.layers
     low, high = voxels.min(), voxels.max()
     why = None

@@ -34,11 +34,7 @@ class Span:
     def ticks(self, time: np.ndarray) -> np.ndarray:
         """Rows of ``time`` (t,), s: of each frame the first tick that is not before it.
 
-        Raises
-        ------
-        Error
-            Nothing lies within the span, or a rate that is not positive.
-
+        Raises Error if nothing lies within the span, or for a rate that is not positive.
         """
         if not (np.isfinite(self.rate) and self.rate > 0):
             raise Error(f"the rate of frames must be positive, got {self.rate:g}")
@@ -49,14 +45,7 @@ class Span:
         return np.unique(np.minimum(np.searchsorted(time, wanted - 5e-10), within[-1]))
 
     def within(self, time: np.ndarray) -> np.ndarray:
-        """Rows of ``time`` (t,), s, that lie within the span.
-
-        Raises
-        ------
-        Error
-            There are none.
-
-        """
+        """Rows of ``time`` (t,), s, that lie within the span; Error if there are none."""
         end = np.inf if self.end is None else self.end
         rows = np.flatnonzero((time >= self.start) & (time <= end))
         if len(time) == 0:

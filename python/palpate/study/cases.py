@@ -62,14 +62,7 @@ class Case:
 
 
 def cases_of(path: Path, text: str, tables: Mapping[str, Any]) -> list[Case]:
-    """Bodies of a study file.
-
-    Raises
-    ------
-    SceneError
-        A mistake in it, with its line.
-
-    """
+    """Bodies of a study file; SceneError for a mistake in it, with its line."""
     base = {name: value for name, value in tables.items() if name not in ("grid", "case")}
     grid, listed = tables.get("grid", {}), tables.get("case", [{}])
     if not isinstance(grid, Mapping) or not isinstance(listed, list):

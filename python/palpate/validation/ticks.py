@@ -104,11 +104,7 @@ def tick_times(
 ) -> np.ndarray:
     """Time each tick of a path (t, tools, 3), m, that is run several times offline: (plays, t) us of its thread.
 
-    Raises
-    ------
-    SimulationError
-        A fault that latched within the path.
-
+    Raises SimulationError for a fault that latched within the path.
     """
     orientations = np.broadcast_to(np.array(orientation), (*path.shape[:2], 4)).copy()
     grabs = np.zeros(path.shape[:2], dtype=bool)

@@ -52,14 +52,7 @@ def decode(message: bytes) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
 
 
 def parse(text: str | bytes) -> dict[str, Any]:
-    """Read a client's message: a JSON object with a type.
-
-    Raises
-    ------
-    ViewerError
-        Anything else.
-
-    """
+    """Read a client's message: a JSON object with a type; ViewerError for anything else."""
     if isinstance(text, bytes):
         raise ViewerError("a client sends text messages only")
     try:

@@ -64,11 +64,7 @@ class Preparation:
 async def prepare(server: ViewerServer, preparation: Preparation) -> None:
     """Prepare the scene of a server that shows nothing yet, and let it be touched.
 
-    Raises
-    ------
-    Error
-        A scene that cannot be prepared, or that a page has cancelled. The pages show why.
-
+    Raises Error, which the pages show too, for a scene that cannot be prepared, or that a page has cancelled.
     """
     building, loop = server.begin_building(), asyncio.get_running_loop()
     reporter = server.reporter(preparation.name, building)

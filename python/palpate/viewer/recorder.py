@@ -32,11 +32,7 @@ class SessionRecorder:
     def start(self) -> None:
         """Record in a new file, named by scene and time; no file is ever written over.
 
-        Raises
-        ------
-        Error
-            The file cannot be written, or the loop is being recorded already.
-
+        Raises Error if the file cannot be written, or the loop is being recorded already.
         """
         if self._simulation.recording is not None:
             raise ViewerError("record: this session is being recorded already")

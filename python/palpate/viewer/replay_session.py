@@ -54,11 +54,7 @@ class ReplaySession(Session):
     def handle(self, message: Mapping[str, Any]) -> bool:
         """Go to a tick, play or pause, or change the speed. Returns that no settings changed.
 
-        Raises
-        ------
-        Error
-            A message that makes no sense, or one that wants to press or change something.
-
+        Raises Error for a message that makes no sense, or one that wants to press or change something.
         """
         if message["type"] != "replay":
             raise ViewerError("this is a replay: nothing can be pressed or changed")
@@ -84,14 +80,7 @@ class ReplaySession(Session):
         self._goal, self._place = tick, float(tick)
 
     def reshaped(self, message: Mapping[str, Any]) -> None:
-        """Refuse: tools have the shapes that they had.
-
-        Raises
-        ------
-        ViewerError
-            Always.
-
-        """
+        """Raise ViewerError: tools have the shapes that they had."""
         raise ViewerError("this is a replay: tools have the shapes that they had")
 
     def _latest(self) -> Frame:

@@ -155,11 +155,7 @@ class Session:
     def handle(self, message: Mapping[str, Any]) -> bool:
         """Do what a controlling client says. Returns whether settings changed.
 
-        Raises
-        ------
-        Error
-            A message that makes no sense, or a value that is refused.
-
+        Raises Error for a message that makes no sense, or a value that is refused.
         """
         handlers: dict[str, Callable[[Mapping[str, Any]], bool]] = {
             "press": self._press,
@@ -176,14 +172,7 @@ class Session:
         return handler(message)
 
     def record(self, message: Mapping[str, Any]) -> dict[str, Any] | None:
-        """Begin a recording, or end it: the message about its end.
-
-        Raises
-        ------
-        Error
-            A recording that cannot be written.
-
-        """
+        """Begin a recording, or end it: the message about its end; Error for a recording that cannot be written."""
         if not isinstance(message.get("on"), bool):
             raise ViewerError("record: on must be true or false")
         if not message["on"]:
@@ -195,11 +184,7 @@ class Session:
     def reshaped(self, message: Mapping[str, Any]) -> BuiltScene | None:
         """Scene with the same bodies, one tool with the shape of a message; None if it has that now.
 
-        Raises
-        ------
-        Error
-            A shape that the tool may not take.
-
+        Raises Error for a shape that the tool may not take.
         """
         tool, name = index(message, "tool", len(self._active)), word(message, "name")
         scene, own = self.built.scene, self.own_tools[tool]

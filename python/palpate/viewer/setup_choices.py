@@ -99,11 +99,7 @@ class Choices:
     def changed(self, message: Mapping[str, Any], low: np.ndarray, high: np.ndarray) -> Choices:
         """Choices with those of a message, for a body between corners (3,), m.
 
-        Raises
-        ------
-        ViewerError
-            A message that makes no sense, or a value that the body cannot take.
-
+        Raises ViewerError for a message that makes no sense, or a value that the body cannot take.
         """
         readers: dict[str, Callable[[], Any]] = {
             "unit": lambda: _one_of(message, "unit", COMMON_UNITS),

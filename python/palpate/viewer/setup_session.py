@@ -52,14 +52,7 @@ class SetupSession:
         """Nothing is touched."""
 
     def handle(self, message: Mapping[str, Any]) -> bool:
-        """Refuse: nothing can be touched yet.
-
-        Raises
-        ------
-        ViewerError
-            For all but what a page sends when it opens.
-
-        """
+        """Raise ViewerError for all but what a page sends when it opens: nothing can be touched yet."""
         if message["type"] != "release":
             raise ViewerError("nothing can be touched yet: set up a body first")
         return False

@@ -53,18 +53,11 @@ class SiteSizes:
 def write_site(scenes: Sequence[tuple[str, Scene | BuiltScene]], path: Path, gallery: bool | None = None) -> SiteSizes:
     """Write a folder that any web host serves: the page, or with ``gallery`` a page of pictures before it.
 
-    By default several scenes get a gallery.
+    By default several scenes get a gallery. The page opens the first scene, and another one by ``?scene=NAME``. An
+    earlier site of that name is replaced, when the new one is complete.
 
-    The page opens the first scene, and another one by ``?scene=NAME``. An earlier site of that name is replaced, when
-    the new one is complete.
-
-    Raises
-    ------
-    ViewerError
-        A place that is no site, scenes of one name, or a package without page or program.
-    Error
-        As of :meth:`palpate.Scene.build`.
-
+    Raises the errors of :meth:`palpate.Scene.build`, and ViewerError for a place that is no site, scenes of one name,
+    or a package without page or program.
     """
     _require_replaceable(path)
     program = find_program()
@@ -94,11 +87,7 @@ def write_site(scenes: Sequence[tuple[str, Scene | BuiltScene]], path: Path, gal
 def with_precision(scene: Scene, precision: str) -> Scene:
     """Scene whose stores have numbers of another precision: ``f16`` is half as large to fetch as ``f32``.
 
-    Raises
-    ------
-    SceneError
-        A precision that does not exist.
-
+    Raises SceneError for a precision that does not exist.
     """
     if precision not in STORED:
         raise SceneError(f"unknown precision '{precision}': use {', '.join(STORED)}")
@@ -112,14 +101,7 @@ def plain_name(name: str) -> str:
 
 
 def static_folder() -> Path:
-    """Folder of the built page.
-
-    Raises
-    ------
-    ViewerError
-        A package built without the page.
-
-    """
+    """Folder of the built page; ViewerError for a package built without the page."""
     static = Path(str(resources.files("palpate.viewer") / "static"))
     if not (static / PAGE).is_file():
         raise ViewerError("the viewer's page is not built: run 'make viewer' (it needs Node)")
@@ -127,14 +109,7 @@ def static_folder() -> Path:
 
 
 def find_program() -> Path:
-    """Path of the WebAssembly.
-
-    Raises
-    ------
-    ViewerError
-        A package built without it.
-
-    """
+    """Path of the WebAssembly; ViewerError for a package built without it."""
     program = Path(str(resources.files("palpate.viewer") / "web" / PROGRAM))
     if not program.is_file():
         raise ViewerError(

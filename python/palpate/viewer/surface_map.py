@@ -36,11 +36,7 @@ class SurfaceMap:
 def read_map(path: Path, built: BuiltScene) -> list[SurfaceMap | None]:
     """Read ``stiffness.vtu`` or ``detection.vtu`` for the bodies of a scene; None for one that it does not hold.
 
-    Raises
-    ------
-    ViewerError
-        A file that is missing, cannot be read, is no map, or one of other bodies.
-
+    Raises ViewerError for a file that is missing, cannot be read, is no map, or one of other bodies.
     """
     import meshio
 

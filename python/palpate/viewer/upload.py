@@ -57,14 +57,7 @@ class Upload:
         return self.received == self.size
 
     def take(self, part: bytes) -> None:
-        """Take the next part.
-
-        Raises
-        ------
-        ViewerError
-            More than was announced, or a disk that is full.
-
-        """
+        """Take the next part; ViewerError for more than was announced, or a disk that is full."""
         if self.received + len(part) > self.size or not part:
             self.close()
             raise ViewerError(f"{self.file}: its parts do not come to {self.size} bytes")
@@ -85,11 +78,7 @@ class Upload:
 def safe_name(name: Any) -> str:
     """Name of a file without a folder, and without characters that a file system or a terminal may not take.
 
-    Raises
-    ------
-    ViewerError
-        What is no name.
-
+    Raises ViewerError for what is no name.
     """
     if not isinstance(name, str) or len(name.encode("utf-8", "replace")) > LONGEST_NAME:
         raise ViewerError(f"upload: name must be a text of at most {LONGEST_NAME} bytes")
