@@ -28,25 +28,12 @@ MOVES = 1e-3
 
 @dataclass(frozen=True)
 class Mechanism:
-    """A part that moves without deforming.
-
-    Attributes
-    ----------
-    nodes
-        Its nodes.
-    joints
-        Those that it shares with other parts.
-    freedom
-        Motions of the whole body without deformation.
-    parts
-        How many parts take part in them.
-
-    """
+    """A part that moves without deforming."""
 
     nodes: np.ndarray
-    joints: np.ndarray
-    freedom: int
-    parts: int
+    joints: np.ndarray  # those that it shares with other parts
+    freedom: int  # motions of the whole body without deformation
+    parts: int  # how many parts take part in them
 
     def message(self, positions: np.ndarray, whole: int) -> str:
         """Say where it is and what helps; ``positions`` (n, 3) m of the nodes, ``whole`` how many nodes a body has."""

@@ -21,18 +21,10 @@ CONSTANTS: dict[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class StrainLaw:
-    """A material beyond small strain, as the native module takes it.
+    """A material beyond small strain, as the native module takes it."""
 
-    Attributes
-    ----------
-    name
-        One of :data:`CONSTANTS`.
-    parameters
-        Ratios of its constants: `c01 / (c10 + c01)` of Mooney and Rivlin, `c20 / c10` and `c30 / c10` of Yeoh.
-
-    """
-
-    name: str = "linear"
+    name: str = "linear"  # one of :data:`CONSTANTS`
+    # Ratios of its constants: `c01 / (c10 + c01)` of Mooney and Rivlin, `c20 / c10` and `c30 / c10` of Yeoh.
     parameters: tuple[float, float] = (0.0, 0.0)
 
     def terms(self, poissons_ratio: float) -> np.ndarray:

@@ -22,15 +22,9 @@ DRAWS, ORDERS = 2000, 50
 
 @dataclass(frozen=True)
 class Places:
-    """Points of the surface at rest, under which nodules may lie, in the frame of the body.
+    """Points of the surface at rest, under which nodules may lie, in the frame of the body."""
 
-    Attributes
-    ----------
-    points, normals
-        (p, 3) m, and outward unit normals (p, 3).
-
-    """
-
+    # (p, 3) m, and outward unit normals (p, 3).
     points: np.ndarray
     normals: np.ndarray
 

@@ -34,22 +34,11 @@ FAR = 1.0
 
 @dataclass(frozen=True)
 class Curves:
-    """Computed presses of a body whose first modulus is that of the scene.
+    """Computed presses of a body whose first modulus is that of the scene."""
 
-    Attributes
-    ----------
-    force
-        Of each curve, N by depth, m.
-    limit
-        Depth of each curve, m, at which the law ends.
-    error
-        Largest stated error of a force.
-
-    """
-
-    force: tuple[PchipInterpolator, ...]
-    limit: np.ndarray
-    error: float
+    force: tuple[PchipInterpolator, ...]  # of each curve, N by depth, m
+    limit: np.ndarray  # depth of each curve, m, at which the law ends
+    error: float  # largest stated error of a force
 
 
 class Presses:

@@ -32,27 +32,15 @@ POISSON_RANGE, POISSON_RANGE_OF_CONSTANTS = (0.05, 0.495), (0.3, 0.495)
 
 @dataclass(frozen=True)
 class Unknown:
-    """A number that is fitted.
+    """A number that is fitted."""
 
-    Attributes
-    ----------
-    name
-        Its key in the scene, such as ``region.0.youngs_modulus``.
-    start, low, high
-        Value to begin with and its range, of a modulus its logarithm.
-    step
-        Change that differences are taken with.
-    telling
-        Half the width of an interval beyond which the data do not determine the number.
-
-    """
-
-    name: str
+    name: str  # its key in the scene, such as ``region.0.youngs_modulus``
+    # Value to begin with and its range, of a modulus its logarithm.
     start: float
     low: float
     high: float
-    step: float
-    telling: float
+    step: float  # change that differences are taken with
+    telling: float  # half the width of an interval beyond which the data do not determine the number
 
 
 @dataclass(frozen=True)

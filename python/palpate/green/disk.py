@@ -16,22 +16,12 @@ KEPT = {"f16": 4, "f32": 4, "f64": 8}
 
 @dataclass(frozen=True)
 class DiskUse:
-    """Bytes that a precomputation takes on the disk.
+    """Bytes that a precomputation takes on the disk."""
 
-    Attributes
-    ----------
-    store
-        The finished store.
-    partial
-        Finished blocks beside it, until it is finished. Of two entries that mirror each other one is kept.
-    before
-        The store of the stage before the last, which is replaced by rename.
-
-    """
-
-    store: int
+    store: int  # the finished store
+    # Finished blocks beside it, until it is finished. Of two entries that mirror each other one is kept.
     partial: int
-    before: int
+    before: int  # the store of the stage before the last, which is replaced by rename
 
     @property
     def peak(self) -> int:

@@ -26,34 +26,15 @@ from palpate.units import brief_repr
 
 @dataclass(frozen=True)
 class Job:
-    """A precomputation that may begin.
+    """A precomputation that may begin."""
 
-    Attributes
-    ----------
-    body
-        What it is of.
-    region
-        Surface nodes that may be touched, ascending.
-    problem
-        As the native module takes it.
-    first
-        Nodes that are computed first, as ranks among the surface nodes; empty for all at once.
-    key
-        Of the finished store.
-    target
-        Its file.
-    precision
-        As asked for; None lets the body choose.
-
-    """
-
-    body: Body
-    region: np.ndarray
-    problem: tuple[np.ndarray, ...]
-    first: np.ndarray
-    key: str
-    target: Path
-    precision: str | None
+    body: Body  # what it is of
+    region: np.ndarray  # surface nodes that may be touched, ascending
+    problem: tuple[np.ndarray, ...]  # as the native module takes it
+    first: np.ndarray  # nodes that are computed first, as ranks among the surface nodes; empty for all at once
+    key: str  # of the finished store
+    target: Path  # its file
+    precision: str | None  # as asked for; None lets the body choose
 
     @classmethod
     def of(

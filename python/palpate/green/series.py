@@ -27,24 +27,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SeriesJob:
-    """The series of a body for spheres of one radius: what it is of, and its file.
+    """The series of a body for spheres of one radius: what it is of, and its file."""
 
-    Attributes
-    ----------
-    body
-        What it is of.
-    radius
-        m.
-    touchable
-        Surface nodes at which it is known, ascending.
-    store, key
-        File and key of the body's Green's function.
-
-    """
-
-    body: Body
-    radius: float
-    touchable: np.ndarray
+    body: Body  # what it is of
+    radius: float  # m
+    touchable: np.ndarray  # surface nodes at which it is known, ascending
+    # File and key of the body's Green's function.
     store: Path
     key: str
 

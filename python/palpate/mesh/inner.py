@@ -22,26 +22,14 @@ POINTS = np.vstack([np.full((1, 4), 0.25), 0.125 + 0.5 * np.eye(4)])
 
 @dataclass(frozen=True, eq=False)
 class InnerRegion:
-    """A part of the body with a boundary of its own.
+    """A part of the body with a boundary of its own."""
 
-    Attributes
-    ----------
-    name
-        Of the region in the mesh.
-    vertices, faces
-        Triangles of its boundary, (n, 3) m and (k, 3).
-    inside
-        Whether points (k, 3), m, lie within.
-    size
-        Size of the elements there, m.
-
-    """
-
-    name: str
+    name: str  # of the region in the mesh
+    # Triangles of its boundary, (n, 3) m and (k, 3).
     vertices: np.ndarray
     faces: np.ndarray
-    inside: Callable[[np.ndarray], np.ndarray]
-    size: float
+    inside: Callable[[np.ndarray], np.ndarray]  # whether points (k, 3), m, lie within
+    size: float  # size of the elements there, m
 
 
 @dataclass(frozen=True, eq=False)

@@ -47,41 +47,19 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class Wrap:
-    """What was wrapped.
+    """What was wrapped."""
 
-    Attributes
-    ----------
-    vertices, faces
-        Of the closed manifold (n, 3), (k, 3).
-    parts
-        Of the solid, the largest first.
-    volume
-        Of the wanted parts, by the winding number or exactly.
-    cell
-        Of the grid.
-    points
-        Points (k, 3) of the given surface beside the wrap.
-    lost_points
-        Points (k, 3) of walls that the grid lost.
-    lost_share
-        Of the surface of what is wanted.
-    closed_share
-        Of the wrap that closes holes: no triangle of the surface is near.
-    band
-        Mask of the points within so many cells of the wrap.
-
-    """
-
+    # Of the closed manifold (n, 3), (k, 3).
     vertices: np.ndarray
     faces: np.ndarray
-    parts: list[Part]
-    volume: float
-    cell: float
-    points: np.ndarray
-    lost_points: np.ndarray
-    lost_share: float
-    closed_share: float
-    band: Grid
+    parts: list[Part]  # of the solid, the largest first
+    volume: float  # of the wanted parts, by the winding number or exactly
+    cell: float  # of the grid
+    points: np.ndarray  # points (k, 3) of the given surface beside the wrap
+    lost_points: np.ndarray  # points (k, 3) of walls that the grid lost
+    lost_share: float  # of the surface of what is wanted
+    closed_share: float  # of the wrap that closes holes: no triangle of the surface is near
+    band: Grid  # mask of the points within so many cells of the wrap
 
 
 def wrap(field: SolidField, labels: np.ndarray, part: int | None, cells: int) -> Wrap:

@@ -43,25 +43,12 @@ INSTALL = "Install it by 'pip install pytetwild' (for Linux and Windows)"
 
 @dataclass(frozen=True, eq=False)
 class Wrapping:
-    """What is to be wrapped and filled, and how.
+    """What is to be wrapped and filled, and how."""
 
-    Attributes
-    ----------
-    surface
-        Triangles, m.
-    reason
-        Why it is wrapped, after "the surface".
-    job
-        What is asked for.
-    inner
-        Regions whose boundaries elements follow.
-
-    """
-
-    surface: SurfaceFile
-    reason: str
+    surface: SurfaceFile  # triangles, m
+    reason: str  # why it is wrapped, after "the surface"
     job: FillJob
-    inner: InnerRegions | None = None
+    inner: InnerRegions | None = None  # regions whose boundaries elements follow
 
     @property
     def name(self) -> str:

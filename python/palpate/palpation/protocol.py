@@ -27,25 +27,12 @@ NOT_TOUCHABLE, BY_A_SUPPORT, BY_AN_EDGE = "not touchable", "by a support", "by a
 
 @dataclass(frozen=True)
 class Protocol:
-    """A palpation.
+    """A palpation."""
 
-    Attributes
-    ----------
-    spacing
-        Of the points, m.
-    depth
-        From first touch to the deepest point of a press, m.
-    speed
-        Of a press, m/s, or along a stroke.
-    strokes
-        Whether lines are slid over instead of pressing on points.
-
-    """
-
-    spacing: float
-    depth: float
-    speed: float
-    strokes: bool = False
+    spacing: float  # of the points, m
+    depth: float  # from first touch to the deepest point of a press, m
+    speed: float  # of a press, m/s, or along a stroke
+    strokes: bool = False  # whether lines are slid over instead of pressing on points
 
     @classmethod
     def of(cls, spacing: float | str, depth: float | str, speed: float | str, strokes: bool) -> Protocol:
@@ -76,23 +63,13 @@ class Protocol:
 
 @dataclass(frozen=True)
 class Sites:
-    """Where a palpation presses, in the scene.
+    """Where a palpation presses, in the scene."""
 
-    Attributes
-    ----------
-    points, normals
-        (p, 3) m on the surface that tools meet, and outward unit normals (p, 3).
-    bodies
-        (p,) numbers of their bodies.
-    skipped
-        Points left out, by reason.
-
-    """
-
+    # (p, 3) m on the surface that tools meet, and outward unit normals (p, 3).
     points: np.ndarray
     normals: np.ndarray
-    bodies: np.ndarray
-    skipped: dict[str, int] = field(default_factory=dict)
+    bodies: np.ndarray  # (p,) numbers of their bodies
+    skipped: dict[str, int] = field(default_factory=dict)  # points left out, by reason
 
 
 class Selection:

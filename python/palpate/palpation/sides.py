@@ -16,22 +16,13 @@ SHARP, FLAT = np.radians(45.0), np.radians(1.0)
 
 @dataclass(frozen=True)
 class Side:
-    """Part of a surface without sharp edges.
+    """Part of a surface without sharp edges."""
 
-    Attributes
-    ----------
-    positions
-        (s, 3) m, of all nodes of the surface, as the body's own loads have put them.
-    triangles, ranks
-        (t, 3) rows of ``positions``, outward; which triangles of the surface these are (t,).
-    normals, areas
-        (t, 3) outward, and (t,) m^2.
-
-    """
-
-    positions: np.ndarray
+    positions: np.ndarray  # (s, 3) m, of all nodes of the surface, as the body's own loads have put them
+    # (t, 3) rows of ``positions``, outward; which triangles of the surface these are (t,).
     triangles: np.ndarray
     ranks: np.ndarray
+    # (t, 3) outward, and (t,) m^2.
     normals: np.ndarray
     areas: np.ndarray
 

@@ -30,26 +30,14 @@ SAME_END = 1e-7
 
 @dataclass(frozen=True)
 class Track:
-    """The line of a stroke, tick by tick from its first place on.
+    """The line of a stroke, tick by tick from its first place on."""
 
-    Attributes
-    ----------
-    points, normals
-        (t, 3) m, and outward unit normals (t, 3), in the scene.
-    position
-        (t,) m along the line.
-    ticks
-        (k,) at which its places are reached.
-    lead
-        Ticks before, in which the tool comes down.
-
-    """
-
+    # (t, 3) m, and outward unit normals (t, 3), in the scene.
     points: np.ndarray
     normals: np.ndarray
-    position: np.ndarray
-    ticks: np.ndarray
-    lead: int
+    position: np.ndarray  # (t,) m along the line
+    ticks: np.ndarray  # (k,) at which its places are reached
+    lead: int  # ticks before, in which the tool comes down
 
     @classmethod
     def of(cls, simulation: Simulation, sites: Sites, stroke: np.ndarray, protocol: Protocol) -> Track:

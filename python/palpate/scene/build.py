@@ -39,36 +39,19 @@ Progress = bool | Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class BuiltBody:
-    """A body of a scene, ready to be touched.
+    """A body of a scene, ready to be touched."""
 
-    Attributes
-    ----------
-    body
-        None for one from a store, which knows only the surface.
-    green
-        Its Green's function.
-    motion
-        What moves it; None at rest.
-    name
-        What it is called.
-    position, orientation
-        Of its own frame in the scene: m, and a unit quaternion w x y z.
-    series
-        Its displacement beyond small strain by the radius of a sphere, m: as far as it is known, None where nothing is
-        known yet. Empty for a body that stays linear below its contacts.
-    is_growing
-        Whether more of its Green's function is being computed.
-
-    """
-
-    body: Body | None
+    body: Body | None  # None for one from a store, which knows only the surface
     green: GreensFunction
-    motion: BodyMotion | None = None
-    name: str = "body"
+    motion: BodyMotion | None = None  # what moves it; None at rest
+    name: str = "body"  # what it is called
+    # Of its own frame in the scene: m, and a unit quaternion w x y z.
     position: tuple[float, float, float] = (0.0, 0.0, 0.0)
     orientation: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+    # Its displacement beyond small strain by the radius of a sphere, m: as far as it is known, None where nothing is
+    # known yet. Empty for a body that stays linear below its contacts.
     series: tuple[tuple[float, _native.Series | None], ...] = ()
-    is_growing: bool = False
+    is_growing: bool = False  # whether more of its Green's function is being computed
 
     @property
     def is_hyperelastic(self) -> bool:

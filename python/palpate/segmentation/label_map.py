@@ -25,26 +25,15 @@ class Segment:
 
 @dataclass(frozen=True, eq=False)
 class LabelMap:
-    """Labels of a file.
+    """Labels of a file."""
 
-    Attributes
-    ----------
-    name
-        Of the file in messages.
-    layers
-        (layers, nx, ny, nz) integers. Segments of different layers may overlap.
-    affine
-        (4, 4): from indices of voxels to positions of their centres, m. The axes are those of the patient: x to the
-        right, y to the front (anterior), z to the head (superior), RAS in short.
-    segments
-        In the order of the file.
-
-    """
-
-    name: str
+    name: str  # of the file in messages
+    # (layers, nx, ny, nz) integers. Segments of different layers may overlap.
     layers: np.ndarray
+    # (4, 4): from indices of voxels to positions of their centres, m. The axes are those of the patient: x to the
+    # right, y to the front (anterior), z to the head (superior), RAS in short.
     affine: np.ndarray
-    segments: tuple[Segment, ...]
+    segments: tuple[Segment, ...]  # in the order of the file
 
     @property
     def spacing(self) -> np.ndarray:

@@ -17,25 +17,12 @@ MOST_BYTES = 4 << 30
 
 @dataclass(frozen=True, eq=False)
 class RawImage:
-    """Voxels as they stand in a file.
+    """Voxels as they stand in a file."""
 
-    Attributes
-    ----------
-    layers
-        (layers, nx, ny, nz) numbers of any kind.
-    affine
-        (4, 4) from indices to right, anterior, superior, in the file's unit.
-    unit
-        Unit of length that the file names; None: none.
-    segments
-        Segments that the file names; None: none.
-
-    """
-
-    layers: np.ndarray
-    affine: np.ndarray
-    unit: str | None
-    segments: tuple[Segment, ...] | None
+    layers: np.ndarray  # (layers, nx, ny, nz) numbers of any kind
+    affine: np.ndarray  # (4, 4) from indices to right, anterior, superior, in the file's unit
+    unit: str | None  # unit of length that the file names; None: none
+    segments: tuple[Segment, ...] | None  # segments that the file names; None: none
 
 
 def require_size(path: Path, sizes: Sequence[int], dtype: np.dtype) -> None:

@@ -16,20 +16,12 @@ from palpate.simulation import Frame, Recording, frame_of, simulation_of, ticks_
 
 @dataclass(frozen=True)
 class Span:
-    """What of a recording is shown, and how often.
+    """What of a recording is shown, and how often."""
 
-    Attributes
-    ----------
-    start, end
-        s since the recording began; no end is that of the recording.
-    rate
-        Frames a second.
-
-    """
-
+    # s since the recording began; no end is that of the recording.
     start: float = 0.0
     end: float | None = None
-    rate: float = 30.0
+    rate: float = 30.0  # frames a second
 
     def ticks(self, time: np.ndarray) -> np.ndarray:
         """Rows of ``time`` (t,), s: of each frame the first tick that is not before it.
@@ -58,25 +50,12 @@ class Span:
 
 @dataclass(frozen=True)
 class RecordedFrame:
-    """A frame, and what the recording says of it.
+    """A frame, and what the recording says of it."""
 
-    Attributes
-    ----------
-    row
-        Of the recording.
-    time
-        Since the recording began, s.
-    frame
-        Bodies, tools and contacts.
-    present
-        (tools,): whether each is in the scene.
-
-    """
-
-    row: int
-    time: float
-    frame: Frame
-    present: np.ndarray
+    row: int  # of the recording
+    time: float  # since the recording began, s
+    frame: Frame  # bodies, tools and contacts
+    present: np.ndarray  # (tools,): whether each is in the scene
 
 
 class RecordedFrames:

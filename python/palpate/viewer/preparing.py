@@ -45,19 +45,11 @@ class PreparingSession(SetupSession):
 
 @dataclass(frozen=True)
 class Preparation:
-    """What prepares a scene.
+    """What prepares a scene."""
 
-    Attributes
-    ----------
-    name
-        Of the scene.
-    build
-        Is called on a thread of its own, with a reporter of stages and a function that draws a surface: its vertices
-        (k, 3), m, and triangles. Returns the scene and what is computed of it later.
-
-    """
-
-    name: str
+    name: str  # of the scene
+    # Is called on a thread of its own, with a reporter of stages and a function that draws a surface: its vertices (k,
+    # 3), m, and triangles. Returns the scene and what is computed of it later.
     build: Callable[[Reporter, Callable[[np.ndarray, np.ndarray], None]], Prepared]
 
 

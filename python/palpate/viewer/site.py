@@ -27,22 +27,11 @@ TOUCH_PAGE = "touch.html"
 
 @dataclass(frozen=True)
 class SiteSizes:
-    """Bytes of a site.
+    """Bytes of a site."""
 
-    Attributes
-    ----------
-    program
-        Page and WebAssembly, which all scenes share.
-    scenes
-        Of each scene by its name.
-    pictures
-        Of the gallery with its page; 0 of a site with one scene.
-
-    """
-
-    program: int
-    scenes: dict[str, int]
-    pictures: int
+    program: int  # page and WebAssembly, which all scenes share
+    scenes: dict[str, int]  # of each scene by its name
+    pictures: int  # of the gallery with its page; 0 of a site with one scene
 
     @property
     def total(self) -> int:

@@ -32,22 +32,11 @@ FAST_CLOCKS = {
 
 @dataclass(frozen=True)
 class Advice:
-    """Something to change.
+    """Something to change."""
 
-    Attributes
-    ----------
-    key
-        Stable name.
-    finding
-        What is so.
-    remedy
-        Commands or lines of files, one an entry; words that are no command begin with ``#``.
-
-    """
-
-    key: str
-    finding: str
-    remedy: tuple[str, ...]
+    key: str  # stable name
+    finding: str  # what is so
+    remedy: tuple[str, ...]  # commands or lines of files, one an entry; words that are no command begin with ``#``
 
 
 def advice(

@@ -15,20 +15,12 @@ ELSEWHERE = 0.6
 
 @dataclass(frozen=True)
 class Curve:
-    """Places a step apart on a surface.
+    """Places a step apart on a surface."""
 
-    Attributes
-    ----------
-    points, normals
-        (n, 3) m on the flat triangles that the surface is drawn by, and (n, 3) outward, interpolated between the nodes.
-    step
-        m.
-
-    """
-
+    # (n, 3) m on the flat triangles that the surface is drawn by, and (n, 3) outward, interpolated between the nodes.
     points: np.ndarray
     normals: np.ndarray
-    step: float
+    step: float  # m
 
     def part(self, keep: np.ndarray) -> Curve:
         """Longest run of consecutive places of a mask (n,)."""
