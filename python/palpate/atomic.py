@@ -52,7 +52,7 @@ def _kind(mode: int) -> str:
 def written_beside(path: Path) -> Iterator[Path]:
     """Give a path to write to, which becomes ``path`` when the block ends well, and is deleted otherwise.
 
-    Raises ``error`` for a place that is no regular file. An OSError from within the block is given the name ``path`` (a
+    Raises Error for a place that is no regular file. An OSError from within the block is given the name ``path`` (a
     full disk names nothing).
     """
     target = destination(path)

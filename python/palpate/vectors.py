@@ -65,6 +65,11 @@ def brief(values: Iterable[float]) -> str:
     return f"[{', '.join(f'{value:.4g}' for value in values)}]"
 
 
+def place_text(point: Iterable[float], unit: str = "m") -> str:
+    """Write a place to four digits, such as ``(0.012, 0, -1.5) m``."""
+    return f"({', '.join(f'{value:.4g}' for value in point)}) {unit}"
+
+
 def rotated(vectors: np.ndarray, orientation: Sequence[float]) -> np.ndarray:
     """Rotate vectors (..., 3) by a unit quaternion `w + v`: `p + 2 v x (v x p + w p)`."""
     w, v = orientation[0], np.array(orientation[1:])
