@@ -76,20 +76,8 @@ class Selection:
     """Which places of the bodies of a scene are palpated; what is left out is counted.
 
     A place is left out where a node of its triangle may not be touched, and where a support or a sharp edge is closer
-    than the contact is wide, `sqrt(R d)` of a sphere.
-
-    Parameters
-    ----------
-    simulation, protocol
-        Bodies and tool, depth and spacing.
-    on
-        Predicate over places in a body's own frame; None takes all.
-
-    Raises
-    ------
-    SceneError
-        A spacing wider than every body.
-
+    than the contact is wide, `sqrt(R d)` of a sphere. ``on`` is a predicate over places in a body's own frame; None
+    takes all. Raises SceneError for a spacing wider than every body.
     """
 
     def __init__(self, simulation: Simulation, protocol: Protocol, on: str | None):

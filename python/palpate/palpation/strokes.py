@@ -15,7 +15,7 @@ from palpate.errors import SceneError
 from palpate.palpation.press import standing_on
 from palpate.palpation.protocol import Protocol, Selection, Sites, closest
 from palpate.palpation.runs import Path3D
-from palpate.palpation.sides import Side
+from palpate.palpation.sides import Side, distances_to_lines
 from palpate.simulation import Simulation
 
 # Step between the passes, of the depth, and how many there are; places a spacing at which a stroke is measured, and the
@@ -124,7 +124,8 @@ def _lines(side: Side, spacing: float) -> list[tuple[np.ndarray, np.ndarray]]:
         for chain in _chained(segments):
             forward = chain if (chain[-1] - chain[0]) @ first >= 0 else chain[::-1]
             places = _resampled(forward, spacing / PER_SPACING)
-            lines.append((places, side.ranks[faces[_nearest(places, segments)]]))
+            nearest = distances_to_lines(places, segments[:, 0], segments[:, 1]).argmin(axis=1)
+            lines.append((places, side.ranks[faces[nearest]]))
     return lines
 
 
@@ -160,12 +161,3 @@ def _resampled(chain: np.ndarray, step: float) -> np.ndarray:
     count = max(1, round(arc[-1] / step))
     at = (np.arange(count) + 0.5) * arc[-1] / count
     return np.column_stack([np.interp(at, arc, axis) for axis in chain.T])
-
-
-def _nearest(places: np.ndarray, segments: np.ndarray) -> np.ndarray:
-    """Which of the segments (n, 2, 3) is closest to each place (k,)."""
-    start, along = segments[:, 0], segments[:, 1] - segments[:, 0]
-    squared = np.maximum((along**2).sum(axis=1), 1e-300)
-    offset = places[:, None] - start
-    share = np.clip((offset * along).sum(axis=2) / squared, 0.0, 1.0)
-    return np.linalg.norm(offset - share[..., None] * along, axis=2).argmin(axis=1)
