@@ -12,6 +12,7 @@ from pydantic import ValidationError
 from palpate import _native
 from palpate.errors import SceneError, SchedulingWarning
 from palpate.scene import BuiltScene, Scene
+from palpate.scene.mistakes import reason_of
 from palpate.scene.tables import DeviceTable
 from palpate.units import brief_repr
 
@@ -45,8 +46,7 @@ def with_scheduling(device: DeviceTable, cpus: Sequence[int] | None, priority: i
         table = DeviceTable(**{**device.model_dump(exclude_unset=True), **changes}) if changes else device
     except ValidationError as error:
         first = error.errors()[0]
-        reason = first["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
-        raise SceneError(f"device.{first['loc'][0]}: {reason}, got {first['input']}") from None
+        raise SceneError(f"device.{first['loc'][0]}: {reason_of(error)}, got {first['input']}") from None
     if cpus is not None:
         require_cpus(table.cpus)
     return table
