@@ -48,6 +48,16 @@ def require_writable(path: Path, error: type[Error]) -> None:
         raise error(f"{path}: there is no folder {path.parent if not path.is_symlink() else folder}; make it first")
 
 
+def require_replaceable(folder: Path, mark: str, error: type[Error]) -> None:
+    """Raise ``error`` for a place that a folder cannot take: a file, or a folder with other things than ``mark``."""
+    if folder.is_dir() and any(folder.iterdir()) and not (folder / mark).is_file():
+        raise error(f"{folder}: is a folder of something else: give another name")
+    if folder.exists() and not folder.is_dir():
+        raise error(f"{folder}: is a file: give another name, or delete it first")
+    if not folder.absolute().parent.is_dir():
+        raise error(f"{folder}: there is no folder {folder.parent}; make it first")
+
+
 def _with_other_ending(path: Path) -> Path | None:
     """Only file of the same name and another ending, or the same name in other letters."""
     if not path.parent.is_dir():

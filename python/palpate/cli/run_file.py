@@ -188,14 +188,15 @@ def _changed(table: Any, values: Mapping[str, Any]) -> Any:
     """Table of the same kind with other values, as strictly checked as in a file."""
     from pydantic import ValidationError
 
+    from palpate.scene.mistakes import reason_of
+
     try:
         return type(table)(**{**table.model_dump(exclude_unset=True), **values})
     except ValidationError as error:
         first = error.errors()[0]
-        reason = first["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
         # What a validator of the whole table refuses has no place: it is one of the values.
         key = str(first["loc"][0]) if first["loc"] else next(iter(values))
-        raise SceneError(f"{FLAGS[key]}: {reason}") from None
+        raise SceneError(f"{FLAGS[key]}: {reason_of(error)}") from None
 
 
 def _radii(tool: Any, radius: str) -> dict[str, float]:

@@ -82,6 +82,14 @@ def positive_or_none(message: Mapping[str, Any], key: str) -> float | None:
     return value
 
 
+def flag(message: Mapping[str, Any], key: str) -> bool:
+    """Take true or false of a client's message."""
+    value = message.get(key)
+    if not isinstance(value, bool):
+        raise ViewerError(f"{message['type']}: {key} must be true or false")
+    return value
+
+
 def whole(message: Mapping[str, Any], key: str, low: int, high: int) -> int:
     """Take a whole number within bounds of a client's message."""
     value = message.get(key)

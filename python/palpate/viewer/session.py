@@ -20,7 +20,7 @@ from palpate.scene.tables import ToolTable
 from palpate.simulation import Contact, Frame, Simulation
 from palpate.viewer.fields import ClientView, Fields
 from palpate.viewer.log_rows import RecentRows, downsampled
-from palpate.viewer.messages import encode, index, number, numbered, quaternion, vector, word
+from palpate.viewer.messages import encode, flag, index, number, numbered, quaternion, vector, word
 from palpate.viewer.motion import HISTORY_COLUMNS, MovingBody, history
 from palpate.viewer.recorder import SessionRecorder
 from palpate.viewer.shown_body import ShownBody, title_of
@@ -173,9 +173,7 @@ class Session:
 
     def record(self, message: Mapping[str, Any]) -> dict[str, Any] | None:
         """Begin a recording, or end it: the message about its end; Error for a recording that cannot be written."""
-        if not isinstance(message.get("on"), bool):
-            raise ViewerError("record: on must be true or false")
-        if not message["on"]:
+        if not flag(message, "on"):
             return self.recorder.stop()
         self.release()
         self.recorder.start()
@@ -360,9 +358,7 @@ class Session:
         tool, position = index(message, "tool", len(self._active)), np.array(vector(message, "position"))
         if tool in self.simulation.devices:
             raise ViewerError(f"press: tool {tool} is moved by {self.simulation.devices[tool]}")
-        grab = message.get("grab", False)
-        if not isinstance(grab, bool):
-            raise ViewerError("press: grab must be true or false")
+        grab = "grab" in message and flag(message, "grab")
         if np.abs(position - self._centre).max() > REACH * self.size:
             raise ViewerError("press: the position is far away from the body")
         turned = quaternion(message, "orientation") if "orientation" in message else None

@@ -11,7 +11,7 @@ import numpy as np
 from palpate.body.tissues import TISSUES, Tissue
 from palpate.errors import ViewerError
 from palpate.mesh.size import COMMON_UNITS
-from palpate.viewer.messages import number, vector, whole, word
+from palpate.viewer.messages import flag, number, vector, whole, word
 
 AXES = "xyz"
 # A nodule that is placed first: in the middle, of this part of the body's shortest side, and so many times as stiff.
@@ -103,7 +103,7 @@ class Choices:
         """
         readers: dict[str, Callable[[], Any]] = {
             "unit": lambda: _one_of(message, "unit", COMMON_UNITS),
-            "painted": lambda: _flag(message, "painted"),
+            "painted": lambda: flag(message, "painted"),
             "plane": lambda: _plane(message, high - low),
             "tissue": lambda: _one_of(message, "tissue", [tissue.name for tissue in TISSUES]),
             "radius": lambda: _radius(message, "radius", high - low),
@@ -154,13 +154,6 @@ def _one_of(message: Mapping[str, Any], key: str, known: Sequence[str]) -> str:
     return name
 
 
-def _flag(message: Mapping[str, Any], key: str) -> bool:
-    value = message.get(key)
-    if not isinstance(value, bool):
-        raise ViewerError(f"setup: {key} must be true or false")
-    return value
-
-
 def _table(message: Mapping[str, Any], key: str) -> dict[str, Any]:
     value = message[key]
     if not isinstance(value, dict):
@@ -182,7 +175,7 @@ def _plane(message: Mapping[str, Any], sides: np.ndarray) -> Plane:
     axis, depth = whole(table, "axis", 0, 2), number(table, "depth")
     if not 0 < depth <= 1.01 * sides[axis]:
         raise ViewerError(f"setup: the plane goes up to {1e3 * sides[axis]:.3g} mm into this body")
-    return Plane(axis, _flag(table, "above"), depth)
+    return Plane(axis, flag(table, "above"), depth)
 
 
 def _nodule(message: Mapping[str, Any], low: np.ndarray, high: np.ndarray) -> Nodule | None:

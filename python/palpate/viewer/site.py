@@ -14,6 +14,7 @@ from pathlib import Path
 from palpate.atomic import folder_beside
 from palpate.errors import SceneError, ViewerError
 from palpate.green.disk import STORED
+from palpate.input_file import require_replaceable
 from palpate.scene import BuiltScene, Scene
 from palpate.viewer.gallery import PICTURES, Card, gallery_page
 from palpate.viewer.gallery_picture import gallery_picture
@@ -48,7 +49,7 @@ def write_site(scenes: Sequence[tuple[str, Scene | BuiltScene]], path: Path, gal
     Raises the errors of :meth:`palpate.Scene.build`, and ViewerError for a place that is no site, scenes of one name,
     or a package without page or program.
     """
-    _require_replaceable(path)
+    require_replaceable(path, PROGRAM, ViewerError)
     program = find_program()
     names = [plain_name(name) for name, _ in scenes]
     if (twice := next((name for name in names if names.count(name) > 1), None)) is not None:
@@ -110,15 +111,6 @@ def find_program() -> Path:
 def meta(name: str, content: str) -> str:
     """Element of a page's head that its script reads."""
     return f'<meta name="palpate-{name}" content="{html.escape(content)}" />'
-
-
-def _require_replaceable(path: Path) -> None:
-    if path.is_dir() and any(path.iterdir()) and not (path / PROGRAM).is_file():
-        raise ViewerError(f"{path}: is a folder of something else: give another name")
-    if path.exists() and not path.is_dir():
-        raise ViewerError(f"{path}: is a file: give another name, or delete it first")
-    if not path.absolute().parent.is_dir():
-        raise ViewerError(f"{path}: there is no folder {path.parent}; make it first")
 
 
 def _copy_page(folder: Path, names: Sequence[str], is_gallery: bool) -> None:
