@@ -128,9 +128,8 @@ class Unknowns:
         for slot in self.slots:
             key = "material" if slot.rank is None else f"{slot.key}.{slot.rank}"
             own = {name.removeprefix(f"{key}."): v for name, v in values.items() if name.startswith(f"{key}.")}
-            if "c10" in own and slot.table.youngs_modulus is None:
-                own.pop("youngs_modulus")
-            elif "c10" in own and "youngs_modulus" not in slot.table.model_fields_set:
+            given = slot.table.youngs_modulus is not None and "youngs_modulus" in slot.table.model_fields_set
+            if "c10" in own and not given:
                 own.pop("youngs_modulus")
             if slot.rank is None and own["poissons_ratio"] == slot.material.poissons_ratio:
                 own.pop("poissons_ratio")

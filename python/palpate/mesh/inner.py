@@ -69,8 +69,8 @@ class InnerRegions:
                 raise MeshError(f"{name}: segment '{title}' is too small for the elements; --max-size makes finer ones")
 
     def snapped(self, mesh: TetMesh) -> TetMesh:
-        """Put nodes between regions onto the boundaries, as far as no element becomes bad."""
-        return snap(mesh, self.project, _nodes_between(mesh))
+        """Put inner nodes between regions onto the boundaries, as far as no element becomes bad."""
+        return snap(mesh, self.project, np.setdiff1d(faces_between(mesh), mesh.surface_nodes))
 
     def project(self, points: np.ndarray) -> np.ndarray:
         """Closest points on the boundary that is nearest; a point that is far from all stays."""
@@ -91,8 +91,3 @@ def faces_between(mesh: TetMesh) -> np.ndarray:
     corners = corners[order]
     same = (corners[1:] == corners[:-1]).all(axis=1) & (regions[1:] != regions[:-1])
     return corners[1:][same]
-
-
-def _nodes_between(mesh: TetMesh) -> np.ndarray:
-    """Corners between regions that are not on the surface."""
-    return np.setdiff1d(np.unique(faces_between(mesh)), mesh.surface_nodes)

@@ -271,7 +271,7 @@ def _placed(
     try:
         BodyTable(model="beam", position=place, orientation=turned)
     except ValidationError as error:
-        raise SceneError(f"a body's orientation {reason_of(error)}") from None
+        raise SceneError(reason_of(error)) from None
     return place, turned
 
 

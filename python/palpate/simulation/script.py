@@ -46,12 +46,16 @@ def orientations_of(orientations: Any, positions: np.ndarray) -> np.ndarray:
     if turned.shape != shape:
         raise SceneError(f"orientations must have shape {shape}, as the positions, got {turned.shape}")
     present = np.isfinite(positions).all(axis=2)
-    length = np.linalg.norm(turned, axis=2)
-    bad = np.argwhere(present & ~(np.abs(length - 1.0) <= UNIT_LENGTH))
-    if len(bad):
-        tick, tool = bad[0]
-        raise SceneError(f"the orientation of tool {tool} at tick {tick} is not a unit quaternion w x y z")
+    require_unit_length(turned, present, "at tick")
     return turned
+
+
+def require_unit_length(orientations: np.ndarray, present: np.ndarray, row: str) -> None:
+    """Refuse quaternions (r, tools, 4) of tools in the scene (r, tools) that are not of length one."""
+    bad = np.argwhere(present & ~(np.abs(np.linalg.norm(orientations, axis=2) - 1.0) <= UNIT_LENGTH))
+    if len(bad):
+        number, tool = bad[0]
+        raise SceneError(f"the orientation of tool {tool} {row} {number} is not a unit quaternion w x y z")
 
 
 def grabs_of(grabs: Any, positions: np.ndarray) -> np.ndarray:
