@@ -54,20 +54,9 @@ def kinds() -> list[str]:
 
 
 def listed(kind: str, address: str | None = None, library: str | os.PathLike[str] | None = None) -> Listing:
-    """Ask the driver of a kind what it sees.
+    """Ask the driver of a kind what it sees; DeviceError if there is no such kind.
 
-    Parameters
-    ----------
-    kind
-        One of :func:`kinds`.
-    address, library
-        Of its service, or the vendor's library; None for the driver's own.
-
-    Raises
-    ------
-    DeviceError
-        No such kind.
-
+    ``address`` is that of its service, ``library`` the vendor's library; None for the driver's own.
     """
     if kind not in kinds():
         raise DeviceError(f"there is no driver of kind '{kind}': choose among {', '.join(kinds())}")

@@ -43,21 +43,7 @@ class TrialAnswer:
 
 
 class Course:
-    """An exam of one person.
-
-    Parameters
-    ----------
-    library
-        The bodies.
-    seed
-        Of places and depths.
-
-    Attributes
-    ----------
-    answers
-        So far.
-
-    """
+    """An exam of one person: bodies of a library, places and depths by a seed, and the answers so far."""
 
     def __init__(self, library: Library, seed: int):
         self.library, self.seed = library, seed

@@ -85,16 +85,7 @@ def contrast_at(probability: float, weber_fraction: float, alternatives: int) ->
 
 
 class Psychometrics:
-    """Likelihoods of answers at given felt contrasts, prepared once.
-
-    Parameters
-    ----------
-    contrasts
-        (k,) felt contrasts that occur.
-    alternatives
-        Places of the task.
-
-    """
+    """Likelihoods of answers of a task with so many places, at the felt contrasts (k,) that occur; prepared once."""
 
     def __init__(self, contrasts: np.ndarray, alternatives: int):
         self._alternatives = alternatives

@@ -15,16 +15,7 @@ MOST_SENT = 16_384
 
 
 class Peer:
-    """A peer that has connected.
-
-    Parameters
-    ----------
-    connection
-        Its socket, which this object closes.
-    name
-        Its address.
-
-    """
+    """A peer that has connected: its socket, which this object closes, and its address."""
 
     def __init__(self, connection: socket.socket, name: str):
         connection.setblocking(False)

@@ -28,20 +28,8 @@ FLAT = 1e-6
 def load_label_map(path: str | os.PathLike[str], unit: str | None = None) -> LabelMap:
     """Read a segmentation: ``.seg.nrrd``, ``.nrrd``, ``.nii`` or ``.nii.gz``.
 
-    Parameters
-    ----------
-    path
-        The file.
-    unit
-        Unit of length instead of the file's own; without both it is mm.
-
-    Raises
-    ------
-    MeshError
-        A file that is missing, damaged, of another kind, or without a place in the patient.
-    UnitError
-        A unit that is not a length.
-
+    ``unit`` is the unit of length instead of the file's own; without both it is mm. Raises UnitError for a unit that is
+    not a length, and MeshError for a file that is missing, damaged, of another kind, or without a place in the patient.
     """
     path = Path(path)
     require_file(path, MeshError)

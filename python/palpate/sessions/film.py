@@ -56,16 +56,7 @@ def write_mp4(frames: RecordedFrames, path: Path, rate: float, report: Report = 
 
 
 class Picture:
-    """A figure of matplotlib that is drawn anew for each frame.
-
-    Parameters
-    ----------
-    frames
-        Of which the pictures are.
-    largest
-        Displacement at the end of the colours, m.
-
-    """
+    """A figure of matplotlib that is drawn anew for each frame; its colours end at the ``largest`` displacement, m."""
 
     def __init__(self, frames: RecordedFrames, largest: float):
         from matplotlib import colormaps

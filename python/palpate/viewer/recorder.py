@@ -15,16 +15,7 @@ MOST_IN_A_SECOND = 100
 
 
 class SessionRecorder:
-    """The recording of a running scene.
-
-    Parameters
-    ----------
-    simulation
-        The running loop.
-    folder
-        Where files go.
-
-    """
+    """Recordings of a running loop, as files of a folder."""
 
     def __init__(self, simulation: Simulation, folder: Path):
         self._simulation, self._folder = simulation, folder

@@ -27,12 +27,6 @@ class SessionHost:
 
     One long work at a time prepares another session. All that touches the session is done on the worker's thread, one
     thing after the other; what is done there asks for the session when its turn comes, not before.
-
-    Parameters
-    ----------
-    session
-        What is shown first.
-
     """
 
     def __init__(self, session: Shown):

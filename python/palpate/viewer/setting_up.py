@@ -35,16 +35,7 @@ _PLACE = re.compile(r"^\S.*?\.toml(:\d+)?: (\w+: )?")
 
 
 class SettingUp:
-    """The body that is set up, its files, and what pages ask of it.
-
-    Parameters
-    ----------
-    server
-        Whose session this exchanges.
-    folder
-        Where scenes are saved.
-
-    """
+    """The body that is set up, its files, and what pages ask of it; scenes are saved in ``folder``."""
 
     def __init__(self, server: SessionHost, folder: Path):
         self._server, self._folder = server, folder

@@ -55,37 +55,19 @@ class SegmentChoice:
 
 @dataclass(frozen=True)
 class Choices:
-    """What is chosen.
+    """What is chosen."""
 
-    Attributes
-    ----------
-    unit
-        Of the file; None where it may be one of several and nobody has chosen yet.
-    painted
-        Whether the supports are those that are painted, in place of those below a plane.
-    plane, nodule
-        m, Pa; a body without a nodule has None.
-    tissue
-        Name of a material of `TISSUES`.
-    youngs_modulus, poissons_ratio
-        Its values, or others that were chosen later; Pa.
-    radius, friction
-        Of the tool, m.
-    segments
-        Those of a label map within the largest one, which has the material of the body.
-
-    """
-
-    unit: str | None
-    painted: bool
+    unit: str | None  # of the file; None where it may be one of several and nobody has chosen yet
+    painted: bool  # whether the supports are those that are painted, in place of those below a plane
     plane: Plane
-    tissue: str | None
+    tissue: str | None  # name of a material of `TISSUES`
+    # Of the tissue, or others that were chosen later; Pa.
     youngs_modulus: float
     poissons_ratio: float
-    radius: float
+    radius: float  # of the tool, m
     friction: float | None = None
     nodule: Nodule | None = None
-    segments: tuple[SegmentChoice, ...] = ()
+    segments: tuple[SegmentChoice, ...] = ()  # within the largest one, which has the material of the body
 
     def scaled(self, factor: float) -> Choices:
         """Return the same of a body whose lengths are larger by a factor."""

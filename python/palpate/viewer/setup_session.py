@@ -23,14 +23,7 @@ SAME_POINT = 1e-7
 
 
 class SetupSession:
-    """A body that is set up, or an empty page, in the place of a :class:`palpate.viewer.session.Session`.
-
-    Parameters
-    ----------
-    body
-        None for an empty page.
-
-    """
+    """A body that is set up, or an empty page, in the place of a :class:`palpate.viewer.session.Session`."""
 
     controllable = True
     takes_files = True

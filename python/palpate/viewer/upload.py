@@ -24,21 +24,7 @@ LONGEST_NAME = 120
 
 
 class Upload:
-    """A file on its way.
-
-    Parameters
-    ----------
-    message
-        What the page announces.
-    folder
-        Where the file goes.
-
-    Raises
-    ------
-    ViewerError
-        A file that is too large, or of a kind that is not read.
-
-    """
+    """A file on its way into a folder; ViewerError if it is announced as too large, or of an unknown kind."""
 
     def __init__(self, message: Mapping[str, Any], folder: Path):
         self.file = safe_name(message.get("name"))

@@ -30,18 +30,7 @@ class Curve:
 
 
 def section(mesh: TetMesh, origin: np.ndarray, normal: np.ndarray, step: float) -> Curve:
-    """Longest closed curve in which a plane cuts the surface.
-
-    Parameters
-    ----------
-    mesh
-        A body.
-    origin, normal
-        Of the plane, (3,) m and (3,).
-    step
-        m.
-
-    """
+    """Longest closed curve in which a plane cuts the surface of a body, in places a step, m, apart."""
     side = (mesh.nodes - origin) @ normal
     above = side > 0
     ends = np.sort(mesh.surface_triangles[:, [[0, 1], [1, 2], [2, 0]]], axis=2)
