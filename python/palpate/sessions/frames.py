@@ -72,8 +72,6 @@ class RecordedFrames:
 
     Attributes
     ----------
-    recording
-        See above.
     simulation
         What it was made with.
     rows
