@@ -158,6 +158,11 @@ class StrainMeasure:
 def strain_terms(law: str, first: float, second: float, poisson: float, /) -> list[float] | None: ...
 
 class Series:
+    # (k, 9) at the smooth sides of the surface nodes (k, 3), m. With the outward normal `n` and the pressing force
+    # `F = -n . f` of a force `f` on the body, `U = F^2 b_3 . f + F^3 b_4 . f` is added to its complementary energy:
+    # `b_3` (m/N^2), `b_4` (m/N^3), `1/F_e` (1/N) of the force at which the series ends, and `kappa` (1/N^2) and `alpha`
+    # (1/N) of a body that hardens, where `F^2` and `F^3` stand for functions that grow more slowly (docs/theory.md,
+    # chapter 11).
     fields: np.ndarray
     positions: np.ndarray
     done: int

@@ -28,11 +28,7 @@ def naming(path: Path) -> Iterator[None]:
 def destination(path: Path, error: type[Error] = Error) -> Path:
     """File that is written for ``path``: the one that a symbolic link names, so that the link stays.
 
-    Raises
-    ------
-    Error
-        Of the class ``error``: what is there is no regular file, and must not be replaced by one; or links in a circle.
-
+    Raises ``error`` for what is no regular file, and must not be replaced by one, and for links in a circle.
     """
     try:
         target = path.resolve() if path.is_symlink() else path
@@ -56,13 +52,8 @@ def _kind(mode: int) -> str:
 def written_beside(path: Path) -> Iterator[Path]:
     """Give a path to write to, which becomes ``path`` when the block ends well, and is deleted otherwise.
 
-    Raises
-    ------
-    Error
-        A place that is no regular file.
-    OSError
-        From within the block, naming ``path`` (a full disk names nothing).
-
+    Raises Error for a place that is no regular file. An OSError from within the block is given the name ``path`` (a
+    full disk names nothing).
     """
     target = destination(path)
     remove_leftovers(target)

@@ -28,34 +28,15 @@ def cache_directory() -> Path:
 
 @dataclass(frozen=True)
 class CachedFile:
-    """A file of the cache.
-
-    Attributes
-    ----------
-    path
-        Where it is.
-    name
-        By which it is listed and deleted: the path in the cache, the hash of stores cut short.
-    size
-        Bytes.
-    used
-        When it was last written, or read by a precomputation or a scene, s since 1970.
-    about
-        What it is, in a few words.
-    leftover
-        Whether it is of no more use: the process that wrote it was killed.
-    being_written
-        Whether a process is writing it.
-
-    """
+    """A file of the cache."""
 
     path: Path
-    name: str
-    size: int
-    used: float
-    about: str
-    leftover: bool
-    being_written: bool
+    name: str  # by which it is listed and deleted: the path in the cache, the hash of stores cut short
+    size: int  # bytes
+    used: float  # when it was last written, or read by a precomputation or a scene, s since 1970
+    about: str  # what it is, in a few words
+    leftover: bool  # whether it is of no more use: the process that wrote it was killed
+    being_written: bool  # whether a process is writing it
 
 
 def cached_files() -> list[CachedFile]:
@@ -69,14 +50,7 @@ def cached_files() -> list[CachedFile]:
 
 
 def chosen_files(name: str) -> list[CachedFile]:
-    """Files of the cache by name, or by the beginning of it.
-
-    Raises
-    ------
-    StoreError
-        There are none.
-
-    """
+    """Files of the cache by name, or by the beginning of it; StoreError if there are none."""
     files = cached_files()
     chosen = [file for file in files if name in (file.name, file.path.name, str(file.path))]
     chosen = chosen or [file for file in files if file.path.name.startswith(name) and name]

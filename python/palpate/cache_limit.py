@@ -36,14 +36,7 @@ class Limit(NamedTuple):
 
 
 def cache_limit() -> Limit:
-    """Bytes that the cache may take.
-
-    Raises
-    ------
-    StoreError
-        The file that holds the limit was damaged.
-
-    """
+    """Bytes that the cache may take; StoreError if the file that holds the limit was damaged."""
     file = _file()
     try:
         size = int(file.read_text())
@@ -59,13 +52,7 @@ def cache_limit() -> Limit:
 def set_cache_limit(size: str | float | None) -> None:
     """Limit the cache from now on, bytes or text such as ``"20GB"``, and make room; None: the limit by default.
 
-    Raises
-    ------
-    UnitError
-        No size.
-    StoreError
-        A size that is not positive.
-
+    Raises UnitError for no size; StoreError for a size that is not positive.
     """
     file = _file()
     if size is None:

@@ -34,12 +34,8 @@ def connected(dask: str | Client) -> Iterator[Client]:
     A ``tls://`` address takes the certificates of dask's own configuration (``distributed.comm.tls``: a file of
     ``~/.config/dask``, ``DASK_DISTRIBUTED__COMM__TLS__...``), a client of one's own its ``distributed.Security``.
 
-    Raises
-    ------
-    ClusterError
-        dask.distributed is not installed, no scheduler answers, a ``tls://`` address without certificates or with those
-        of others, or no worker with this version of Palpate is there.
-
+    Raises ClusterError if dask.distributed is not installed, no scheduler answers, the certificates are missing or
+    others, or no worker with this version of Palpate is there.
     """
     try:
         import distributed
@@ -134,14 +130,8 @@ def spread(client: Client, waiting: list[Item], start: Callable[[Item, str], Fut
 
     ``start`` makes the task of an item for the worker at an address. Every worker is kept in work and one task ahead;
     the rest waits here for workers that join. What a worker that dies has not finished goes to others. Items may be
-    added
-    while this goes on. Tasks that are left when the caller stops are cancelled.
-
-    Raises
-    ------
-    ClusterError
-        The scheduler is lost.
-
+    added while this goes on. Tasks that are left when the caller stops are cancelled. Raises ClusterError when the
+    scheduler is lost.
     """
     running: dict[Future, tuple[Item, str]] = {}
     alone = False
@@ -173,11 +163,7 @@ def spread(client: Client, waiting: list[Item], start: Callable[[Item, str], Fut
 def wait_for_some(client: Client, futures: list[Future]) -> list[Future]:
     """Those that have ended, as soon as one has, or none after a while; with none given, wait for a worker to come.
 
-    Raises
-    ------
-    ClusterError
-        The scheduler is lost.
-
+    Raises ClusterError when the scheduler is lost.
     """
     from distributed import CancelledError, wait
 
@@ -193,14 +179,7 @@ def wait_for_some(client: Client, futures: list[Future]) -> list[Future]:
 
 
 def require_scheduler(client: Client) -> None:
-    """Refuse a scheduler that is gone.
-
-    Raises
-    ------
-    ClusterError
-        It is.
-
-    """
+    """Raise ClusterError if the scheduler is gone."""
     if client.status != "running":
         raise _connection_lost_error()
 
@@ -208,14 +187,8 @@ def require_scheduler(client: Client) -> None:
 def result_of(client: Client, future: Future) -> Any:
     """Take the result of a task that has ended; one that was lost with its worker is computed again, and waited for.
 
-    Raises
-    ------
-    ClusterError
-        The task failed for want of workers or of the same version of Palpate, or the scheduler is lost, from which the
-        result comes: the library would wait for it for ever.
-    Exception
-        What the task itself raised.
-
+    Raises what the task itself raised, and ClusterError if it failed for want of workers or of the same version of
+    Palpate, or if the scheduler is lost. The result comes from there: the library would wait for it for ever.
     """
     patience = CONNECT_SECONDS
     while True:
@@ -268,14 +241,7 @@ def _require_workers(client: Client) -> None:
 
 
 def require_version(found: str | None, address: str) -> None:
-    """Refuse another version: its blocks may be of other columns.
-
-    Raises
-    ------
-    ClusterError
-        It is not that of this process.
-
-    """
+    """Raise ClusterError for another version than this process has: its blocks may be of other columns."""
     if found != _native.__version__:
         version_text = "no Palpate" if found is None else f"Palpate {found}"
         raise ClusterError(

@@ -24,12 +24,12 @@ def empty_figure(width: float, height: float) -> Figure:
     return figure
 
 
-def write_figure(figure: Figure, path: Path, *, grid: bool = True) -> None:
+def write_figure(figure: Figure, path: Path, *, grid: bool = True, kind: str = "png") -> None:
     """Light grid where one helps, open frame; written beside and renamed."""
     for axes in figure.axes if grid else ():
         _style_axes(axes)
     with written_beside(path) as partial:
-        figure.savefig(partial, format="png")
+        figure.savefig(partial, format=kind)
 
 
 def _style_axes(axes: Axes) -> None:

@@ -16,14 +16,7 @@ else:
 
 
 def require_file(path: Path, error: type[Error]) -> None:
-    """Refuse what cannot be read as a file.
-
-    Raises
-    ------
-    Error
-        Of the class ``error``: nothing there, a folder, or an empty file.
-
-    """
+    """Raise ``error`` for what cannot be read as a file: nothing there, a folder, or an empty file."""
     if path.is_dir():
         raise error(f"{path} is a folder: name a file in it")
     if not path.exists():
@@ -34,14 +27,7 @@ def require_file(path: Path, error: type[Error]) -> None:
 
 
 def read_toml(path: Path, error: type[Error]) -> tuple[str, dict[str, Any]]:
-    """Text of a TOML file, for the lines of mistakes in it, and its tables.
-
-    Raises
-    ------
-    Error
-        Of the class ``error``: not a file that can be read, or not TOML.
-
-    """
+    """Text of a TOML file, for the lines of mistakes in it, and its tables; ``error`` for what is none."""
     require_file(path, error)
     text = path.read_text(encoding="utf-8", errors="replace")
     try:
@@ -53,17 +39,23 @@ def read_toml(path: Path, error: type[Error]) -> tuple[str, dict[str, Any]]:
 def require_writable(path: Path, error: type[Error]) -> None:
     """Refuse a place where no file can be put, before long work ends there.
 
-    Raises
-    ------
-    Error
-        Of the class ``error``: a folder of that name, a device, a pipe or a socket, or no folder to put it in.
-
+    Raises ``error`` for a folder of that name, a device, a pipe or a socket, or no folder to put it in.
     """
     if path.is_dir():
         raise error(f"{path} is a folder: name a file in it, such as {path / 'body'}{path.suffix}")
     folder = destination(path, error).absolute().parent
     if not folder.is_dir():
         raise error(f"{path}: there is no folder {path.parent if not path.is_symlink() else folder}; make it first")
+
+
+def require_replaceable(folder: Path, mark: str, error: type[Error]) -> None:
+    """Raise ``error`` for a place that a folder cannot take: a file, or a folder with other things than ``mark``."""
+    if folder.is_dir() and any(folder.iterdir()) and not (folder / mark).is_file():
+        raise error(f"{folder}: is a folder of something else: give another name")
+    if folder.exists() and not folder.is_dir():
+        raise error(f"{folder}: is a file: give another name, or delete it first")
+    if not folder.absolute().parent.is_dir():
+        raise error(f"{folder}: there is no folder {folder.parent}; make it first")
 
 
 def _with_other_ending(path: Path) -> Path | None:

@@ -31,11 +31,7 @@ _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\
 def quantity(value: str | float, units: dict[str, float], kind: str) -> float:
     """Read a number (SI) or text such as ``"4mm"``; the result is SI.
 
-    Raises
-    ------
-    UnitError
-        Not a quantity, or a unit that is not in ``units``; the message lists them.
-
+    Raises UnitError for what is no quantity, and for a unit that is not in ``units``; the message lists them.
     """
     if isinstance(value, Real) and not isinstance(value, (bool, np.bool_)):
         return to_float(value)
@@ -92,14 +88,7 @@ memory = _reader(MEMORY_UNITS, "memory size", "Memory in bytes.")
 
 
 def length_scale(unit: str) -> float:
-    """Metres in one ``unit``.
-
-    Raises
-    ------
-    UnitError
-        A unit that is not a length.
-
-    """
+    """Metres in one ``unit``; UnitError for a unit that is not a length."""
     if unit not in LENGTH_UNITS:
         raise UnitError(f"unknown length unit '{unit}': use one of {', '.join(LENGTH_UNITS)}")
     return LENGTH_UNITS[unit]

@@ -16,13 +16,9 @@ Reader = Callable[[Any], float]
 
 
 def three_numbers(values: Any, what: str, error: type[Error], read: Reader | None = None) -> tuple[float, float, float]:
-    """Take three finite numbers; ``what`` names them in messages. With ``read`` each may be text with a unit.
+    """Take three finite numbers, or raise ``error``; ``what`` names them in messages.
 
-    Raises
-    ------
-    Error
-        Of the class ``error``: anything else.
-
+    With ``read`` each may be text with a unit.
     """
     x, y, z = three_components(values, what, error, read)
     if x is None or y is None or z is None:
@@ -33,15 +29,9 @@ def three_numbers(values: Any, what: str, error: type[Error], read: Reader | Non
 def three_components(
     values: Any, what: str, error: type[Error], read: Reader | None = None
 ) -> tuple[float | None, float | None, float | None]:
-    """Take three components, each a finite number or None; ``what`` names them in messages.
+    """Take three components, each a finite number or None, or raise ``error``; ``what`` names them in messages.
 
     With ``read`` each may be text with a unit.
-
-    Raises
-    ------
-    Error
-        Of the class ``error``: anything else.
-
     """
     if isinstance(values, str) or not isinstance(values, Iterable):
         raise error(f"{what} needs three numbers")
@@ -57,14 +47,7 @@ def three_components(
 
 
 def number(value: Any, what: str, error: type[Error]) -> float:
-    """Take a finite number; ``what`` names it in messages.
-
-    Raises
-    ------
-    Error
-        Of the class ``error``: anything else.
-
-    """
+    """Take a finite number, or raise ``error``; ``what`` names it in messages."""
     if not isinstance(value, Real) or isinstance(value, (bool, np.bool_)) or not np.isfinite(to_float(value)):
         raise error(f"{what} must be a finite number, got {brief_repr(value)}")
     return to_float(value)
@@ -80,6 +63,11 @@ def _read(text: str, what: str, error: type[Error], read: Reader) -> float:
 def brief(values: Iterable[float]) -> str:
     """Write numbers to four digits, such as ``[0.012, 0, -1.5]``."""
     return f"[{', '.join(f'{value:.4g}' for value in values)}]"
+
+
+def place_text(point: Iterable[float], unit: str = "m") -> str:
+    """Write a place to four digits, such as ``(0.012, 0, -1.5) m``."""
+    return f"({', '.join(f'{value:.4g}' for value in point)}) {unit}"
 
 
 def rotated(vectors: np.ndarray, orientation: Sequence[float]) -> np.ndarray:

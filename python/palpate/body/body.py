@@ -17,6 +17,7 @@ from palpate.body.supports import Fixed, element_components, fixed_mask, rigid_c
 from palpate.errors import BodyError
 from palpate.mesh import TetMesh
 from palpate.units import brief_repr
+from palpate.vectors import place_text
 
 
 class Body:
@@ -140,9 +141,9 @@ class Body:
             rank = rigid_constraint_rank(self.mesh.nodes[members], self.fixed_mask[members])
             if rank < 6:
                 supports = "no support" if rank == 0 else f"supports that leave {6 - rank} rigid motions free"
-                place = ", ".join(f"{x:.4g}" for x in self.mesh.nodes[members[0]])
+                place = place_text(self.mesh.nodes[members[0]])
                 raise BodyError(
-                    f"the part of {len(members)} nodes around node {members[0]} at ({place}) m has {supports}: "
+                    f"the part of {len(members)} nodes around node {members[0]} at {place} has {supports}: "
                     "fix at least three of its nodes that are not in line"
                 )
         mechanism = find_mechanism(self.mesh, self.fixed_mask)

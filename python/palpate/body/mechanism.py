@@ -17,6 +17,7 @@ import scipy
 from palpate.body.supports import rigid_constraint_rank
 from palpate.mesh import TetMesh
 from palpate.mesh.elements import face_parts
+from palpate.vectors import place_text
 
 # Eigenvalue of the system of a part held by three nodes, one of them off the line of the others by 1e-5 of its size.
 SINGULAR = 1e-10
@@ -28,47 +29,31 @@ MOVES = 1e-3
 
 @dataclass(frozen=True)
 class Mechanism:
-    """A part that moves without deforming.
-
-    Attributes
-    ----------
-    nodes
-        Its nodes.
-    joints
-        Those that it shares with other parts.
-    freedom
-        Motions of the whole body without deformation.
-    parts
-        How many parts take part in them.
-
-    """
+    """A part that moves without deforming."""
 
     nodes: np.ndarray
-    joints: np.ndarray
-    freedom: int
-    parts: int
+    joints: np.ndarray  # those that it shares with other parts
+    freedom: int  # motions of the whole body without deformation
+    parts: int  # how many parts take part in them
 
     def message(self, positions: np.ndarray, whole: int) -> str:
         """Say where it is and what helps; ``positions`` (n, 3) m of the nodes, ``whole`` how many nodes a body has."""
-        part = f"the part of {len(self.nodes)} nodes around {_place(positions[self.nodes].mean(axis=0))}"
+        part = f"the part of {len(self.nodes)} nodes around {place_text(positions[self.nodes].mean(axis=0))}"
         points = positions[self.joints]
         spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
         if len(points) == 1:
-            joint = f"node {self.joints[0]} at {_place(points[0])}, and turns about it"
+            joint = f"node {self.joints[0]} at {place_text(points[0])}, and turns about it"
         elif spread[1] <= np.sqrt(SINGULAR) * spread[0]:
-            first, last = np.lexsort(points.T)[[0, -1]]
-            ends = f"{self.joints[first]} at {_place(points[first])} and {self.joints[last]} at {_place(points[last])}"
-            joint = f"the edge between nodes {ends}, and turns about it"
+            ends = np.lexsort(points.T)[[0, -1]]
+            nodes = " and ".join(f"{self.joints[end]} at {place_text(points[end])}" for end in ends)
+            joint = f"the edge between nodes {nodes}, and turns about it"
         else:
-            joint = f"{len(points)} nodes around {_place(points.mean(axis=0))}, and moves with {self.parts - 1} others"
+            middle = place_text(points.mean(axis=0))
+            joint = f"{len(points)} nodes around {middle}, and moves with {self.parts - 1} others"
         return (
             f"{part} meets the other {whole - len(self.nodes) + len(points)} only at {joint} without deforming: "
             "join the parts by faces of elements, or fix nodes of this one too"
         )
-
-
-def _place(point: np.ndarray) -> str:
-    return f"({', '.join(f'{x:.4g}' for x in point)}) m"
 
 
 def find_mechanism(mesh: TetMesh, fixed: np.ndarray) -> Mechanism | None:

@@ -9,6 +9,7 @@ import scipy
 
 from palpate.errors import BodyError
 from palpate.mesh import TetMesh
+from palpate.vectors import place_text
 
 # A point is inside of a tetrahedron from this part of its height over each face on: parts that only touch share a face.
 DEPTH = 1e-3
@@ -19,13 +20,8 @@ BLOCK = 4096
 def require_apart(mesh: TetMesh, labels: np.ndarray) -> None:
     """Refuse parts, given by the label (n,) of each node, if one reaches into another.
 
-    Looked at are the nodes and the middles of the elements of each part.
-
-    Raises
-    ------
-    BodyError
-        Two parts that overlap, with a place at which they do.
-
+    Looked at are the nodes and the middles of the elements of each part. Raises BodyError for two parts that overlap,
+    with a place at which they do.
     """
     corners = mesh.tets[:, :4]
     of_element = labels[corners[:, 0]]
@@ -36,10 +32,9 @@ def require_apart(mesh: TetMesh, labels: np.ndarray) -> None:
         points = points[((points > low) & (points < high)).all(axis=1)]
         inside = _first_inside(points, other) if len(points) else None
         if inside is not None:
-            place = ", ".join(f"{x:.4g}" for x in inside)
             raise BodyError(
-                f"two parts of the mesh that are not connected overlap at ({place}) m: unite them, or make them two "
-                "bodies"
+                f"two parts of the mesh that are not connected overlap at {place_text(inside)}: unite them, or make "
+                "them two bodies"
             )
 
 

@@ -26,12 +26,8 @@ MAX_LENGTH = 500
 def parse(text: str) -> Callable[[np.ndarray], np.ndarray]:
     """Turn a predicate into a function of the (n, 3) node positions that returns an (n,) mask.
 
-    Raises
-    ------
-    BodyError
-        Anything that is not a comparison of x, y, z with numbers, joined by and, or, not; the message shows where. From
-        the function: a division by zero.
-
+    Raises BodyError for anything that is not a comparison of x, y, z with numbers, joined by and, or, not; the message
+    shows where. The function raises it for a division by zero.
     """
     if len(text) > MAX_LENGTH:
         raise BodyError(f"a predicate may have at most {MAX_LENGTH} characters")

@@ -15,11 +15,7 @@ Selection = Sequence[int] | np.ndarray | Callable[[np.ndarray], np.ndarray]
 def node_indices(values: Any, count: int, what: str) -> np.ndarray:
     """Check a list of nodes or an (n,) mask, as indices below ``count``; ``what`` names it in messages.
 
-    Raises
-    ------
-    BodyError
-        A mask of the wrong length, an index out of range, anything else.
-
+    Raises BodyError for a mask of the wrong length, an index out of range, anything else.
     """
     array = np.asarray(values)
     if array.dtype == bool:

@@ -21,28 +21,16 @@ CONSTANTS: dict[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class StrainLaw:
-    """A material beyond small strain, as the native module takes it.
+    """A material beyond small strain, as the native module takes it."""
 
-    Attributes
-    ----------
-    name
-        One of :data:`CONSTANTS`.
-    parameters
-        Ratios of its constants: `c01 / (c10 + c01)` of Mooney and Rivlin, `c20 / c10` and `c30 / c10` of Yeoh.
-
-    """
-
-    name: str = "linear"
+    name: str = "linear"  # one of :data:`CONSTANTS`
+    # Ratios of its constants: `c01 / (c10 + c01)` of Mooney and Rivlin, `c20 / c10` and `c30 / c10` of Yeoh.
     parameters: tuple[float, float] = (0.0, 0.0)
 
     def terms(self, poissons_ratio: float) -> np.ndarray:
         """Return the three coefficients of a sphere's contact at finite strain.
 
-        Raises
-        ------
-        BodyError
-            A material that the table of coefficients does not reach.
-
+        Raises BodyError for a material that the table of coefficients does not reach.
         """
         if self.name == "linear":
             return np.zeros(3)
@@ -67,11 +55,7 @@ def _range_of(name: str) -> str:
 def strain_law(name: str, constants: dict[str, float | None]) -> tuple[StrainLaw, float | None]:
     """Return the law and the shear modulus at small strain, Pa, which a law without constants leaves open.
 
-    Raises
-    ------
-    BodyError
-        A law that is unknown, or constants that are missing, negative in sum or those of another law.
-
+    Raises BodyError for a law that is unknown, or constants that are missing, negative in sum or those of another law.
     """
     if name not in CONSTANTS:
         raise BodyError(f"law must be one of {', '.join(map(repr, CONSTANTS))}, got {brief_repr(name)}")

@@ -19,11 +19,8 @@ Fixed = str | Sequence[int] | np.ndarray | Mapping[str, Sequence[int]] | Callabl
 def fixed_mask(nodes: np.ndarray, fixed: Fixed) -> np.ndarray:
     """Mask of the fixed components of each node, (n, 3); only None fixes none.
 
-    Raises
-    ------
-    BodyError
-        An index out of range, a mask of the wrong length, an unknown axis, or supports that hold no node.
-
+    Raises BodyError for an index out of range, a mask of the wrong length, an unknown axis, or supports that hold no
+    node.
     """
     if fixed is None:
         return np.zeros((len(nodes), 3), dtype=bool)

@@ -19,13 +19,8 @@ def surface_region(body: Body, region: SurfaceRegion | None, what: str) -> np.nd
     """Surface nodes of a region, ascending; None: all of them. ``what`` names it in errors.
 
     Text is the name or number of a region of the mesh file, whose nodes on the surface are meant, or a predicate over
-    x, y and z, m. Numbers must be surface nodes; all else names those of its nodes that are.
-
-    Raises
-    ------
-    BodyError
-        A number that is no surface node, text that cannot be read, or a region without a surface node.
-
+    x, y and z, m. Numbers must be surface nodes; all else names those of its nodes that are. Raises BodyError for a
+    number that is no surface node, text that cannot be read, or a region without a surface node.
     """
     mesh, surface = body.mesh, body.mesh.surface_nodes
     if region is None:

@@ -15,31 +15,16 @@ NOT_CHECKED = "not checked at the source"
 
 @dataclass(frozen=True)
 class Tissue:
-    """A material with a published measurement.
+    """A material with a published measurement."""
 
-    Attributes
-    ----------
-    name, title
-        What programs and people call it.
-    youngs_modulus
-        Pa.
-    spread
-        Standard deviation over the samples of the source, Pa; 0 where the source has none.
-    poissons_ratio
-        As taken by the source, below one half.
-    source
-        Authors, year, journal, and how it was measured.
-    checked
-        Whether the figures were compared with the source itself. The abstract alone, or another's quotation, is not it.
-
-    """
-
+    # What programs and people call it.
     name: str
     title: str
-    youngs_modulus: float
-    spread: float
-    poissons_ratio: float
-    source: str
+    youngs_modulus: float  # Pa
+    spread: float  # standard deviation over the samples of the source, Pa; 0 where the source has none
+    poissons_ratio: float  # as taken by the source, below one half
+    source: str  # authors, year, journal, and how it was measured
+    # Whether the figures were compared with the source itself. The abstract alone, or another's quotation, is not it.
     checked: bool = True
 
     @property

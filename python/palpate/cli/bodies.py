@@ -5,9 +5,8 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -24,20 +23,8 @@ if TYPE_CHECKING:
     from palpate.progress import Reporter
 
 
-class Mesher(str, Enum):
-    """What --mesher takes."""
-
-    NETGEN = "netgen"
-    WRAP = "wrap"
-
-
-class Element(str, Enum):
-    """What --element takes."""
-
-    LINEAR = "linear"
-    QUADRATIC = "quadratic"
-
-
+Mesher = Literal["netgen", "wrap"]
+Element = Literal["linear", "quadratic"]
 Unit = Annotated[
     str | None,
     typer.Option(
@@ -112,11 +99,7 @@ def is_surface(path: Path) -> bool:
 def segment_tables(typed: Sequence[str] | None) -> list[dict[str, str]]:
     """Tables ``[[body.segment]]`` of what was typed, such as ``liver`` or ``tumor=40kPa``.
 
-    Raises
-    ------
-    UnitError
-        A modulus that is no positive pressure.
-
+    Raises UnitError for a modulus that is no positive pressure.
     """
     from palpate.errors import UnitError
     from palpate.units import pressure
@@ -155,7 +138,7 @@ def fill_options(
     """Options of filling, as they were typed."""
     from palpate.mesh.fill_job import FillOptions
 
-    given: dict[str, Any] = {"mesher": None if mesher is None else mesher.value}
+    given: dict[str, Any] = {"mesher": mesher}
     given["segments"] = tuple(table["name"] for table in segment_tables(segments))
     if part is not None:
         given["part"] = int(part) if part.isascii() and part.isdigit() else part
@@ -175,11 +158,8 @@ def read_any(
 ) -> TetMesh:
     """Read a volume mesh, or fill a surface; ``drawn`` takes the boundary of a segmentation before it is filled.
 
-    Raises
-    ------
-    MeshError
-        A file that cannot be read or filled, or one of 10-node tetrahedra where 4-node ones are asked for.
-
+    Raises MeshError for a file that cannot be read or filled, or one of 10-node tetrahedra where 4-node ones are asked
+    for.
     """
     from palpate.errors import MeshError
     from palpate.mesh import TetMesh
@@ -189,7 +169,7 @@ def read_any(
 
     if is_surface(path) or is_segmentation(path):
         size = None if max_size is None else length(max_size)
-        chosen = "linear" if element == Element.LINEAR else "quadratic"
+        chosen = element or "quadratic"
         return tetrahedralize_with(chosen, path, size, unit, options=fill, progress=progress, drawn=drawn)
     if max_size is not None or fill not in (None, FillOptions()):
         raise MeshError(
@@ -197,22 +177,15 @@ def read_any(
             "that are filled"
         )
     mesh = TetMesh.read(path, unit)
-    if element == Element.LINEAR and mesh.is_quadratic:
+    if element == "linear" and mesh.is_quadratic:
         raise MeshError(f"{path} holds 10-node tetrahedra: leave out --element, or give quadratic")
-    return mesh.to_quadratic() if element == Element.QUADRATIC else mesh
+    return mesh.to_quadratic() if element == "quadratic" else mesh
 
 
 def body_of(
     mesh: TetMesh, material: Material | Mapping[int | str, Material], fix: str, loads: Loads | None = None
 ) -> Body:
-    """Body that is held where a predicate says.
-
-    Raises
-    ------
-    BodyError
-        A predicate that holds nowhere.
-
-    """
+    """Body that is held where a predicate says; BodyError for a predicate that holds nowhere."""
     from palpate.body import Body, parse
     from palpate.errors import BodyError
 

@@ -64,14 +64,7 @@ def devices(
 
 
 def _choose_device(found: list[Listing], id: str | None) -> tuple[str, str | None]:
-    """Kind and identity of the device to be checked.
-
-    Raises
-    ------
-    DeviceError
-        None, or one that cannot be opened: why.
-
-    """
+    """Kind and identity of the device to be checked; DeviceError if there is none, or why it cannot be opened."""
     from palpate.errors import DeviceError
 
     if id is not None:
@@ -167,7 +160,7 @@ def _print_line(line: str) -> None:
 def _listing_lines(found: list[Listing]) -> Iterator[str]:
     for listing in found:
         facts = "; ".join(f"{name} {value}" for name, value in listing.facts.items())
-        yield f"{listing.kind}: {_count(len(listing.found))}{f' ({facts})' if facts else ''}"
+        yield f"{listing.kind}: {len(listing.found) or 'none'} found{f' ({facts})' if facts else ''}"
         for device in listing.found:
             texts = [device.name, _limits_text(device.limits), *(f"{k} {v}" for k, v in device.facts.items())]
             yield f"  {device.id}  {', '.join(text for text in texts if text)}"
@@ -186,10 +179,6 @@ def _usb_lines(plugged: list[UsbDevice]) -> Iterator[str]:
         if not device.allowed:
             yield f"  you may not open it{'' if device.node else ', for the system has no file for it'}:"
             yield from (f"    {line}" for line in device.remedy)
-
-
-def _count(number: int) -> str:
-    return "none found" if number == 0 else f"{number} found"
 
 
 def _limits_text(limits: DeviceLimits) -> str:

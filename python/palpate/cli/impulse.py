@@ -31,11 +31,7 @@ SECONDS = 0.5
 def impulse_history(model: str, paper: bool, seconds: float, out: Path) -> None:
     """Strike the free node farthest from the supports, and write how it moves as CSV and PNG.
 
-    Raises
-    ------
-    SceneError
-        No model of that name.
-
+    Raises SceneError for no model of that name.
     """
     body = _body(model, paper)
     mesh, node = body.mesh, free_end(body)
@@ -63,11 +59,7 @@ def impulse_history(model: str, paper: bool, seconds: float, out: Path) -> None:
 def impulse_scene(model: str, paper: bool) -> Scene:
     """Scene of the same body and strike, for the viewer: on the node itself, by average acceleration as in the paper.
 
-    Raises
-    ------
-    SceneError
-        No model of that name.
-
+    Raises SceneError for no model of that name.
     """
     body = _body(model, paper)
     xi1, f1, xi2, f2 = DAMPING

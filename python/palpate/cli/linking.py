@@ -45,14 +45,7 @@ class LinkOptions:
 
 @contextlib.contextmanager
 def linked(server: ViewerServer, options: LinkOptions, folder: Path) -> Iterator[None]:
-    """Serve OpenIGTLink for the scene that a page's server runs.
-
-    Raises
-    ------
-    ViewerError
-        A port in use.
-
-    """
+    """Serve OpenIGTLink for the scene that a page's server runs; ViewerError for a port in use."""
     if not options.is_asked:
         yield
         return

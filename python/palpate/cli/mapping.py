@@ -79,11 +79,10 @@ def map_command(
 
     length, quickness = _quantities()
     given = {"spacing": length("--grid", grid), "depth": length("--depth", depth), "speed": quickness("--speed", speed)}
-    lengths = {"unit": unit, "max_size": max_size, "element": element}
-    lengths |= {"mesher": mesher, "part": part, "max_volume_loss": max_volume_loss}
-    lengths |= {"segment": tuple(segment) if segment else None}
     material = {"youngs_modulus": youngs_modulus, "poissons_ratio": poissons_ratio}
-    built = _build_scene(file, RunOptions(radius=radius, fix=fix, **material, **lengths))
+    of_file = {"unit": unit, "max_size": max_size, "element": element, "mesher": mesher, "part": part}
+    of_file |= {"max_volume_loss": max_volume_loss, "segment": tuple(segment) if segment else None}
+    built = _build_scene(file, RunOptions(radius=radius, fix=fix, **material, **of_file))
     folder = out if out is not None else Path(f"{file.stem}-palpation")
     with _folder(folder):
         found, detection, written = _palpate(built, folder, given, on, strokes, against)

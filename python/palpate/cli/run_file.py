@@ -54,14 +54,7 @@ class RunOptions:
     device: tuple[str, ...] | None = None
 
     def refuse(self, file: Path, allowed: set[str], reason: str, of_loop: bool = True) -> None:
-        """Refuse options that the kind of file does not take.
-
-        Raises
-        ------
-        SceneError
-            The first of them, and why.
-
-        """
+        """Refuse options that the kind of file does not take; SceneError says which is the first of them, and why."""
         for field in fields(self):
             if getattr(self, field.name) is not None and field.name not in (allowed | OF_LOOP if of_loop else allowed):
                 raise SceneError(f"{file}: {FLAGS[field.name]} is not for this file: {reason}")
@@ -104,13 +97,8 @@ def built_from(
 ) -> BuiltScene:
     """Scene of a file, ready to run; what is computed on beside it goes into ``growing``, if there is one.
 
-    ``drawn`` takes the boundary of a segmentation, vertices, m, and triangles, before it is filled.
-
-    Raises
-    ------
-    Error
-        A file that cannot be read, filled or solved, or an option that does not belong to it.
-
+    ``drawn`` takes the boundary of a segmentation, vertices, m, and triangles, before it is filled. Raises Error for a
+    file that cannot be read, filled or solved, or an option that does not belong to it.
     """
     from palpate.progress import status_line
     from palpate.scene import Scene
@@ -200,14 +188,15 @@ def _changed(table: Any, values: Mapping[str, Any]) -> Any:
     """Table of the same kind with other values, as strictly checked as in a file."""
     from pydantic import ValidationError
 
+    from palpate.scene.mistakes import reason_of
+
     try:
         return type(table)(**{**table.model_dump(exclude_unset=True), **values})
     except ValidationError as error:
         first = error.errors()[0]
-        reason = first["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
         # What a validator of the whole table refuses has no place: it is one of the values.
         key = str(first["loc"][0]) if first["loc"] else next(iter(values))
-        raise SceneError(f"{FLAGS[key]}: {reason}") from None
+        raise SceneError(f"{FLAGS[key]}: {reason_of(error)}") from None
 
 
 def _radii(tool: Any, radius: str) -> dict[str, float]:

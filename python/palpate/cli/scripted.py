@@ -24,36 +24,20 @@ AT_LIMIT = 0.9
 
 @dataclass(frozen=True)
 class PressRecord:
-    """What a scripted press leaves.
+    """What a scripted press leaves."""
 
-    Attributes
-    ----------
-    log
-        Rows of the 1 kHz loop.
-    depth, strain
-        At each row: approach of tool and surface, m, and largest strain; between frames, of which there are 120 and
-        some tens a second, they are interpolated.
-    hardest, last
-        The frame with the largest force on the body, and the last one.
-    limited
-        Whether the limit of strain held the tool.
-    force
-        Largest on the body in any frame, N; the device's own is within its limits.
-    interrupted
-        Whether Ctrl-C ended it early.
-    refused
-        Why the tool was in no contact in some frame though it reached the body; None if that was in none.
-
-    """
-
-    log: np.ndarray
+    log: np.ndarray  # rows of the 1 kHz loop
+    # At each row: approach of tool and surface, m, and largest strain; between frames, of which there are 120 and some
+    # tens a second, they are interpolated.
     depth: np.ndarray
     strain: np.ndarray
+    # The frame with the largest force on the body, and the last one.
     hardest: Frame
     last: Frame
-    limited: bool
-    force: float
-    interrupted: bool
+    limited: bool  # whether the limit of strain held the tool
+    force: float  # largest on the body in any frame, N; the device's own is within its limits
+    interrupted: bool  # whether Ctrl-C ended it early
+    # Why the tool was in no contact in some frame though it reached the body; None if that was in none.
     refused: str | None = None
 
 

@@ -59,14 +59,7 @@ def export(
 
 
 def _target(file: Path, to: str | None, out: Path | None) -> Path:
-    """File to write.
-
-    Raises
-    ------
-    Error
-        No format, an unknown one, or two that contradict each other.
-
-    """
+    """File to write; Error for no format, an unknown one, or two that contradict each other."""
     from palpate.errors import Error
     from palpate.sessions import FORMATS
 

@@ -13,19 +13,10 @@ from palpate.errors import DeviceError
 
 @dataclass(frozen=True)
 class Obstacle:
-    """Why something is not there.
+    """Why something is not there."""
 
-    Attributes
-    ----------
-    what
-        What is wrong, and where.
-    advice
-        What to do.
-
-    """
-
-    what: str
-    advice: str
+    what: str  # what is wrong, and where
+    advice: str  # what to do
 
     def __str__(self) -> str:
         return f"{self.what}: {self.advice}"
@@ -33,51 +24,23 @@ class Obstacle:
 
 @dataclass(frozen=True)
 class FoundDevice:
-    """A device that a driver sees.
+    """A device that a driver sees."""
 
-    Attributes
-    ----------
-    id
-        By which a scene names it.
-    name
-        Model.
-    limits
-        What it can render, as far as is known before it is opened.
-    obstacle
-        Why it cannot be opened now; None if it can.
-    facts
-        Such as its firmware, by name.
-
-    """
-
-    id: str
-    name: str
-    limits: DeviceLimits
-    obstacle: Obstacle | None
-    facts: dict[str, str]
+    id: str  # by which a scene names it
+    name: str  # model
+    limits: DeviceLimits  # what it can render, as far as is known before it is opened
+    obstacle: Obstacle | None  # why it cannot be opened now; None if it can
+    facts: dict[str, str]  # such as its firmware, by name
 
 
 @dataclass(frozen=True)
 class Listing:
-    """What one driver sees.
+    """What one driver sees."""
 
-    Attributes
-    ----------
-    kind
-        Of the driver, as a scene names it.
-    found
-        Its devices.
-    missing
-        Why there are none, or no more; None where nothing is missing.
-    facts
-        Of the driver itself, such as its version and where its library lies, by name.
-
-    """
-
-    kind: str
+    kind: str  # of the driver, as a scene names it
     found: tuple[FoundDevice, ...]
-    missing: Obstacle | None
-    facts: dict[str, str]
+    missing: Obstacle | None  # why there are none, or no more; None where nothing is missing
+    facts: dict[str, str]  # of the driver itself, such as its version and where its library lies, by name
 
     @property
     def ready(self) -> list[FoundDevice]:
@@ -91,20 +54,9 @@ def kinds() -> list[str]:
 
 
 def listed(kind: str, address: str | None = None, library: str | os.PathLike[str] | None = None) -> Listing:
-    """Ask the driver of a kind what it sees.
+    """Ask the driver of a kind what it sees; DeviceError if there is no such kind.
 
-    Parameters
-    ----------
-    kind
-        One of :func:`kinds`.
-    address, library
-        Of its service, or the vendor's library; None for the driver's own.
-
-    Raises
-    ------
-    DeviceError
-        No such kind.
-
+    ``address`` is that of its service, ``library`` the vendor's library; None for the driver's own.
     """
     if kind not in kinds():
         raise DeviceError(f"there is no driver of kind '{kind}': choose among {', '.join(kinds())}")

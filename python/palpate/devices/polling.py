@@ -88,11 +88,7 @@ class PollingThread:
     def start(self) -> _native.OpenedDevice:
         """Open the device and wait for its first reading; what a loop takes.
 
-        Raises
-        ------
-        DeviceError
-            What `open` or the first `read` raised, in one line, or that they took too long.
-
+        Raises DeviceError, in one line, for what `open` or the first `read` raised, or because they took too long.
         """
         native = _native.ProgrammedDevice(self.name, self._device.limits.arguments, 1.0 / self._period)
         self._thread = threading.Thread(

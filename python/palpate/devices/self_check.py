@@ -39,36 +39,19 @@ LARGEST_FORCE: float = _native.DeviceCheck.largest_force
 
 @dataclass(frozen=True)
 class Watched:
-    """What a device said while it was watched.
+    """What a device said while it was watched."""
 
-    Attributes
-    ----------
-    seconds
-        How long.
-    readings, rate
-        Measurements, and how many a second, Hz.
-    longest_gap
-        Longest time between two, s.
-    deviation
-        Standard deviation of the position by axis, m: at rest, its noise.
-    lowest, highest
-        Ends of the range seen by axis, m.
-    buttons
-        Those that were held at any time, by number.
-    fault
-        What went wrong; None if nothing did.
-
-    """
-
-    seconds: float
+    seconds: float  # how long
+    # Measurements, and how many a second, Hz.
     readings: int
     rate: float
-    longest_gap: float
-    deviation: tuple[float, float, float]
+    longest_gap: float  # longest time between two, s
+    deviation: tuple[float, float, float]  # standard deviation of the position by axis, m: at rest, its noise
+    # Ends of the range seen by axis, m.
     lowest: tuple[float, float, float]
     highest: tuple[float, float, float]
-    buttons: tuple[int, ...]
-    fault: str | None
+    buttons: tuple[int, ...]  # those that were held at any time, by number
+    fault: str | None  # what went wrong; None if nothing did
 
     @property
     def passed(self) -> bool:
@@ -79,28 +62,13 @@ class Watched:
 
 @dataclass(frozen=True)
 class Push:
-    """What a slowly rising force did.
+    """What a slowly rising force did."""
 
-    Attributes
-    ----------
-    direction
-        One of :data:`DIRECTIONS`.
-    force
-        Largest force that was put out, N.
-    moved
-        How far the tip went along it, m; negative is against it.
-    ran_away
-        Whether it went so far that the force was taken back: nobody held it.
-    fault
-        What went wrong; None if nothing did.
-
-    """
-
-    direction: str
-    force: float
-    moved: float
-    ran_away: bool
-    fault: str | None
+    direction: str  # one of :data:`DIRECTIONS`
+    force: float  # largest force that was put out, N
+    moved: float  # how far the tip went along it, m; negative is against it
+    ran_away: bool  # whether it went so far that the force was taken back: nobody held it
+    fault: str | None  # what went wrong; None if nothing did
 
     @property
     def verdict(self) -> str:
@@ -117,24 +85,15 @@ class Push:
 
 @dataclass(frozen=True)
 class Checked:
-    """All results of a check.
+    """All results of a check."""
 
-    Attributes
-    ----------
-    name, limits
-        Of the device.
-    rest, range
-        Watched at rest, and while it was moved through its workspace.
-    pushes
-        One a direction; empty where no force was wanted.
-
-    """
-
+    # Of the device.
     name: str
     limits: DeviceLimits
+    # Watched at rest, and while it was moved through its workspace.
     rest: Watched
     range: Watched
-    pushes: tuple[Push, ...] = ()
+    pushes: tuple[Push, ...] = ()  # one a direction; empty where no force was wanted
 
     @property
     def passed(self) -> bool:

@@ -16,32 +16,16 @@ RULES = "/etc/udev/rules.d/70-palpate-haptics.rules"
 
 @dataclass(frozen=True)
 class UsbDevice:
-    """A device that is plugged in.
+    """A device that is plugged in."""
 
-    Attributes
-    ----------
-    kind
-        Of the driver that it belongs to.
-    name
-        Maker, or model.
-    vendor, product
-        Its numbers, four hexadecimal digits each.
-    node
-        File by which programs open it; "" if it has none yet.
-    allowed
-        Whether this user may read and write that file.
-    remedy
-        What gives the permission, a line each.
-
-    """
-
-    kind: str
-    name: str
+    kind: str  # of the driver that it belongs to
+    name: str  # maker, or model
+    # Its numbers, four hexadecimal digits each.
     vendor: str
     product: str
-    node: str
-    allowed: bool
-    remedy: tuple[str, ...]
+    node: str  # file by which programs open it; "" if it has none yet
+    allowed: bool  # whether this user may read and write that file
+    remedy: tuple[str, ...]  # what gives the permission, a line each
 
 
 @dataclass(frozen=True)

@@ -28,14 +28,7 @@ class Matrices:
 
     @classmethod
     def of(cls, body: Body, mass: str) -> Matrices:
-        """Assemble.
-
-        Raises
-        ------
-        BodyError
-            An unknown kind of mass matrix, a node without mass, or nothing left free.
-
-        """
+        """Assemble; BodyError for an unknown kind of mass matrix, a node without mass, or nothing left free."""
         if mass not in MASS_KINDS:
             raise BodyError(f"mass must be 'consistent' or 'lumped', got {mass!r}")
         stiffness, mass_matrix = body.stiffness(), body.mass(lumped=mass == "lumped")

@@ -19,48 +19,22 @@ from palpate.exam.staircase import Staircase
 
 @dataclass(frozen=True)
 class Trial:
-    """One question.
+    """One question."""
 
-    Attributes
-    ----------
-    number
-        From 1.
-    nodule
-        Number of the nodule in the library; None for a trial with nothing hidden.
-
-    """
-
-    number: int
-    nodule: int | None
+    number: int  # from 1
+    nodule: int | None  # number of the nodule in the library; None for a trial with nothing hidden
 
 
 @dataclass(frozen=True)
 class TrialAnswer:
-    """A trial and its answer, as a row of the table holds them.
+    """A trial and its answer, as a row of the table holds them."""
 
-    Attributes
-    ----------
-    trial
-        What was asked.
-    marked
-        Point of the surface (3,), m, in the frame of the body; None for "none".
-    place
-        Number of the place closest to the mark; None without one.
-    distance
-        From the mark to the place of the nodule, m; None without either.
-    score
-        1 for a right answer, 0 for a wrong one; "none" over a nodule is scored as a guess, `1/m`.
-    seconds
-        From when the body could be touched to the answer.
-
-    """
-
-    trial: Trial
-    marked: tuple[float, float, float] | None
-    place: int | None
-    distance: float | None
-    score: float
-    seconds: float
+    trial: Trial  # what was asked
+    marked: tuple[float, float, float] | None  # point of the surface (3,), m, in the frame of the body; None for "none"
+    place: int | None  # number of the place closest to the mark; None without one
+    distance: float | None  # from the mark to the place of the nodule, m; None without either
+    score: float  # 1 for a right answer, 0 for a wrong one; "none" over a nodule is scored as a guess, `1/m`
+    seconds: float  # from when the body could be touched to the answer
 
     @property
     def correct(self) -> bool:
@@ -69,21 +43,7 @@ class TrialAnswer:
 
 
 class Course:
-    """An exam of one person.
-
-    Parameters
-    ----------
-    library
-        The bodies.
-    seed
-        Of places and depths.
-
-    Attributes
-    ----------
-    answers
-        So far.
-
-    """
+    """An exam of one person: bodies of a library, places and depths by a seed, and the answers so far."""
 
     def __init__(self, library: Library, seed: int):
         self.library, self.seed = library, seed

@@ -144,14 +144,7 @@ class ExamFile(Scene):
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> ExamFile:
-        """Read an exam file.
-
-        Raises
-        ------
-        SceneError
-            Missing, not TOML, or a wrong key or value, with its line.
-
-        """
+        """Read an exam file; SceneError if it is missing, not TOML, or has a wrong key or value, with its line."""
         exam = super().read(path)
         assert isinstance(exam, cls)
         exam._check()

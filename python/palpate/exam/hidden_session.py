@@ -31,16 +31,7 @@ TAKEN = ("press", "release", "reset")
 
 
 class HiddenSession(Session):
-    """One trial.
-
-    Parameters
-    ----------
-    built
-        Body with a nodule or without.
-    loud_force
-        Force at which the tone is loudest, N.
-
-    """
+    """One trial: a body with a nodule or without; the tone is loudest at ``loud_force``, N."""
 
     takes_files = False
 

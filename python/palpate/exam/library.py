@@ -45,23 +45,13 @@ LEAST_CONTRAST = 1e-4
 
 @dataclass(frozen=True)
 class Nodule:
-    """A ball that may be hidden.
+    """A ball that may be hidden."""
 
-    Attributes
-    ----------
-    place
-        Number of the place under which it lies.
-    radius, depth
-        m; the depth is that of its middle.
-    contrast
-        Its Young's modulus over that of the tissue around it.
-
-    """
-
-    place: int
+    place: int  # number of the place under which it lies
+    # m; the depth is that of its middle.
     radius: float
     depth: float
-    contrast: float
+    contrast: float  # its Young's modulus over that of the tissue around it
 
 
 class Library:

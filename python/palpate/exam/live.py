@@ -15,6 +15,7 @@ from palpate.exam.record import Record
 from palpate.exam.result import Result
 from palpate.scene import BuiltScene
 from palpate.viewer.background import CancellableTask
+from palpate.viewer.messages import flag
 from palpate.viewer.server import Client, ViewerServer
 from palpate.viewer.status import error_message
 
@@ -31,23 +32,7 @@ def finish(course: Course, folder: Path) -> Result:
 
 
 class ExamServer(ViewerServer):
-    """Serves an exam that is not over.
-
-    Parameters
-    ----------
-    course
-        Where it stands.
-    folder
-        Of the table and the results.
-    host, port
-        Where it listens.
-
-    Attributes
-    ----------
-    result
-        None until the last answer.
-
-    """
+    """Serves an exam that is not over; its ``result``, in ``folder`` with the table, is None until the last answer."""
 
     def __init__(self, course: Course, folder: Path, *, host: str, port: int):
         trial = course.trial
@@ -80,8 +65,7 @@ class ExamServer(ViewerServer):
 
     async def _answer(self, message: dict[str, Any], session: HiddenSession) -> None:
         """Score and write an answer, and show the next body, or the result."""
-        if not isinstance(message.get("found"), bool):
-            raise ViewerError("answer: found must be true or false")
+        found = flag(message, "found")
         trial = self._course.trial
         if trial is None:
             raise ViewerError("the exam is over")
@@ -89,8 +73,8 @@ class ExamServer(ViewerServer):
         try:
             # A body that could not be shown was not asked about.
             if trial.number == self._shown:
-                touched = await self.call(lambda: session.touched) if message["found"] else None
-                if message["found"] and touched is None:
+                touched = await self.call(lambda: session.touched) if found else None
+                if found and touched is None:
                     raise ViewerError("touch the body first: a mark is where the tool touches it, or did last")
                 seconds = time.monotonic() - (self._began or time.monotonic())
                 answered = self._course.scored(touched, seconds)

@@ -16,16 +16,7 @@ from palpate.exam.psychometric import Estimate
 
 
 class Observer:
-    """Answers trials.
-
-    Parameters
-    ----------
-    weber_fraction
-        Standard deviation of what is felt, over what there is to be felt.
-    seed
-        Of its noise.
-
-    """
+    """Answers trials; the Weber fraction is the standard deviation of what is felt, over what there is to be felt."""
 
     def __init__(self, weber_fraction: float, seed: int):
         self._weber_fraction = weber_fraction

@@ -22,15 +22,9 @@ DRAWS, ORDERS = 2000, 50
 
 @dataclass(frozen=True)
 class Places:
-    """Points of the surface at rest, under which nodules may lie, in the frame of the body.
+    """Points of the surface at rest, under which nodules may lie, in the frame of the body."""
 
-    Attributes
-    ----------
-    points, normals
-        (p, 3) m, and outward unit normals (p, 3).
-
-    """
-
+    # (p, 3) m, and outward unit normals (p, 3).
     points: np.ndarray
     normals: np.ndarray
 
@@ -42,11 +36,7 @@ class Places:
 def places_of(exam: ExamFile, mesh: TetMesh, touchable: np.ndarray) -> Places:
     """Places of an exam, listed or drawn, on the faces whose corners may all be touched.
 
-    Raises
-    ------
-    SceneError
-        No such faces, or a box in which so many random places do not fit.
-
+    Raises SceneError for no such faces, or a box in which so many random places do not fit.
     """
     triangles = mesh.surface_triangles
     triangles = triangles[np.isin(triangles, touchable).all(axis=1)]

@@ -39,26 +39,14 @@ POINTS, HALF_WIDTH = 81, 7.0
 
 @dataclass(frozen=True)
 class Estimate:
-    """Estimate of a hand from its answers.
+    """Estimate of a hand from its answers."""
 
-    Attributes
-    ----------
-    weber_fraction
-        The most probable one.
-    low, high
-        Of the 95 % interval; 0 and infinity where the answers do not bound it.
-    lapse_rate
-        Share of trials in which the answer is a guess whatever is felt.
-    alternatives
-        Places of the task.
-
-    """
-
-    weber_fraction: float
+    weber_fraction: float  # the most probable one
+    # Of the 95 % interval; 0 and infinity where the answers do not bound it.
     low: float
     high: float
-    lapse_rate: float
-    alternatives: int
+    lapse_rate: float  # share of trials in which the answer is a guess whatever is felt
+    alternatives: int  # places of the task
 
     def probability(self, contrasts: np.ndarray) -> np.ndarray:
         """Probability (n,) of a right answer at felt contrasts (n,)."""
@@ -97,16 +85,7 @@ def contrast_at(probability: float, weber_fraction: float, alternatives: int) ->
 
 
 class Psychometrics:
-    """Likelihoods of answers at given felt contrasts, prepared once.
-
-    Parameters
-    ----------
-    contrasts
-        (k,) felt contrasts that occur.
-    alternatives
-        Places of the task.
-
-    """
+    """Likelihoods of answers of a task with so many places, at the felt contrasts (k,) that occur; prepared once."""
 
     def __init__(self, contrasts: np.ndarray, alternatives: int):
         self._alternatives = alternatives

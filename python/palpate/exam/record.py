@@ -44,14 +44,7 @@ def row_of(course: Course, answered: TrialAnswer) -> dict[str, str]:
 
 
 class Record:
-    """The file of an exam.
-
-    Parameters
-    ----------
-    path
-        A table that is there already is gone on with.
-
-    """
+    """The file of an exam; a table that is there already is gone on with."""
 
     def __init__(self, path: Path):
         self._path = path

@@ -17,41 +17,23 @@ from palpate.exam.psychometric import Estimate
 
 @dataclass(frozen=True)
 class Result:
-    """Of a finished exam.
+    """Of a finished exam."""
 
-    Attributes
-    ----------
-    estimate
-        Weber fraction, its interval, lapses.
-    target
-        Probability of a right answer that the staircase sought.
-    felt_contrast
-        Found with that probability, `dK/K`; infinite for a hand that never is so sure.
-    material_contrasts
-        ``radius``, ``depth`` (m) and ``contrast``, `E/E0`, that is felt so, for each kind of nodule; ``contrast`` is
-        None where none of the exam's feels so soft or so hard.
-    trials, right, none
-        Over nodules: how many, how many right answers, how many times "none".
-    blanks, false_marks
-        Trials with nothing hidden, and how many of them were marked all the same.
-    seconds
-        All answers together.
-    passed
-        None where the file has no criterion.
-
-    """
-
-    estimate: Estimate
-    target: float
-    felt_contrast: float
+    estimate: Estimate  # Weber fraction, its interval, lapses
+    target: float  # probability of a right answer that the staircase sought
+    felt_contrast: float  # found with that probability, `dK/K`; infinite for a hand that never is so sure
+    # ``radius``, ``depth`` (m) and ``contrast``, `E/E0`, that is felt so, for each kind of nodule; ``contrast`` is None
+    # where none of the exam's feels so soft or so hard.
     material_contrasts: tuple[dict[str, float | None], ...]
+    # Over nodules: how many, how many right answers, how many times "none".
     trials: int
     right: int
     none: int
+    # Trials with nothing hidden, and how many of them were marked all the same.
     blanks: int
     false_marks: int
-    seconds: float
-    passed: bool | None
+    seconds: float  # all answers together
+    passed: bool | None  # None where the file has no criterion
 
     @classmethod
     def of(cls, course: Course) -> Result:

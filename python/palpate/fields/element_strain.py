@@ -9,14 +9,7 @@ from palpate.fields.stress import StressRecovery
 
 
 class ElementStrain:
-    """Strain at the surface nodes, recovered from the elements.
-
-    Parameters
-    ----------
-    recovery
-        Of the body, at its surface nodes.
-
-    """
+    """Strain at the surface nodes of a body, recovered from the elements."""
 
     def __init__(self, recovery: StressRecovery):
         self.recovery = recovery

@@ -117,11 +117,7 @@ def _data(mesh: meshio.Mesh, name: str, meshes: Sequence[meshio.Mesh]) -> np.nda
 def write_result(mesh: meshio.Mesh, path: str | os.PathLike[str]) -> None:
     """Write a result by the ending of its file; an existing file is replaced only when the new one is complete.
 
-    Raises
-    ------
-    MeshError
-        Another ending than .vtu or .vtk, or no place for a file.
-
+    Raises MeshError for another ending than .vtu or .vtk, or no place for a file.
     """
     import meshio
 
@@ -134,14 +130,7 @@ def write_result(mesh: meshio.Mesh, path: str | os.PathLike[str]) -> None:
 
 
 def as_pyvista(mesh: meshio.Mesh) -> Any:
-    """Turn a mesh into pyvista's unstructured grid.
-
-    Raises
-    ------
-    Error
-        pyvista is not installed.
-
-    """
+    """Turn a mesh into pyvista's unstructured grid; Error if pyvista is not installed."""
     try:
         import pyvista
     except ImportError:

@@ -10,16 +10,10 @@ from palpate.errors import BodyError
 
 
 class Interior:
-    """Finite element solution inside a body whose surface displacements are known.
+    """Finite element solution inside a supported body whose surface displacements are known.
 
     ``K_II u_I = F_I - K_IS u_S`` for any contact and any supports on the surface; ``F`` are the body's own loads. One
     sparse solve, milliseconds: for frames, not for the force loop.
-
-    Parameters
-    ----------
-    body
-        A supported body.
-
     """
 
     def __init__(self, body: Body):

@@ -19,22 +19,11 @@ MOST_TRIANGLES = 40_000
 
 @dataclass(frozen=True)
 class DeformedSurface:
-    """A surface to be drawn.
+    """A surface to be drawn."""
 
-    Attributes
-    ----------
-    positions
-        (s, 3) m, at rest.
-    triangles
-        (t, 3) rows of ``positions``, outward.
-    displacements
-        (s, 3) m.
-
-    """
-
-    positions: np.ndarray
-    triangles: np.ndarray
-    displacements: np.ndarray
+    positions: np.ndarray  # (s, 3) m, at rest
+    triangles: np.ndarray  # (t, 3) rows of ``positions``, outward
+    displacements: np.ndarray  # (s, 3) m
 
 
 def draw(surfaces: Sequence[DeformedSurface], magnification: float, title: str) -> Figure:

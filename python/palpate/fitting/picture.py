@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from palpate.atomic import written_beside
-from palpate.figures import COLORS, empty_figure
+from palpate.figures import COLORS, empty_figure, write_figure
 from palpate.fitting.measurements import Indentations
 
 # More names than these are not written into the picture.
@@ -15,7 +14,7 @@ MOST_NAMES = 8
 
 
 def picture_of_fit(measured: Indentations, predicted: np.ndarray, used: np.ndarray, title: str, path: Path) -> None:
-    """Draw forces (n,), N, and whether rows (n,) were used, into a file that is written beside and renamed."""
+    """Draw forces (n,), N, and whether rows (n,) were used, into a file."""
     figure = empty_figure(6.4, 5.2)
     curves, residuals = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
     largest = np.abs(measured.force).max()
@@ -34,8 +33,4 @@ def picture_of_fit(measured: Indentations, predicted: np.ndarray, used: np.ndarr
     curves.title.set_fontsize(9)
     residuals.set(xlabel="depth (mm)", ylabel="residual (% of largest)")
     curves.legend(frameon=False)
-    for axes in (curves, residuals):
-        axes.grid(alpha=0.25)
-        axes.spines[["top", "right"]].set_visible(False)
-    with written_beside(path) as partial:
-        figure.savefig(partial, format=path.suffix[1:].lower())
+    write_figure(figure, path, kind=path.suffix[1:].lower())

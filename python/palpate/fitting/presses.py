@@ -34,22 +34,11 @@ FAR = 1.0
 
 @dataclass(frozen=True)
 class Curves:
-    """Computed presses of a body whose first modulus is that of the scene.
+    """Computed presses of a body whose first modulus is that of the scene."""
 
-    Attributes
-    ----------
-    force
-        Of each curve, N by depth, m.
-    limit
-        Depth of each curve, m, at which the law ends.
-    error
-        Largest stated error of a force.
-
-    """
-
-    force: tuple[PchipInterpolator, ...]
-    limit: np.ndarray
-    error: float
+    force: tuple[PchipInterpolator, ...]  # of each curve, N by depth, m
+    limit: np.ndarray  # depth of each curve, m, at which the law ends
+    error: float  # largest stated error of a force
 
 
 class Presses:
@@ -170,11 +159,7 @@ class Presses:
 def _to_press(scene: Scene, measured: Indentations) -> Scene:
     """Scene as it is pressed: its first tool alone, of the measured radius, without the limit of strain.
 
-    Raises
-    ------
-    FitError
-        A scene that has no static law of its material alone.
-
+    Raises FitError for a scene that has no static law of its material alone.
     """
     if len(scene.bodies) > 1:
         raise FitError("the scene has several bodies: fit one at a time")

@@ -32,27 +32,15 @@ POISSON_RANGE, POISSON_RANGE_OF_CONSTANTS = (0.05, 0.495), (0.3, 0.495)
 
 @dataclass(frozen=True)
 class Unknown:
-    """A number that is fitted.
+    """A number that is fitted."""
 
-    Attributes
-    ----------
-    name
-        Its key in the scene, such as ``region.0.youngs_modulus``.
-    start, low, high
-        Value to begin with and its range, of a modulus its logarithm.
-    step
-        Change that differences are taken with.
-    telling
-        Half the width of an interval beyond which the data do not determine the number.
-
-    """
-
-    name: str
+    name: str  # its key in the scene, such as ``region.0.youngs_modulus``
+    # Value to begin with and its range, of a modulus its logarithm.
     start: float
     low: float
     high: float
-    step: float
-    telling: float
+    step: float  # change that differences are taken with
+    telling: float  # half the width of an interval beyond which the data do not determine the number
 
 
 @dataclass(frozen=True)
@@ -140,9 +128,8 @@ class Unknowns:
         for slot in self.slots:
             key = "material" if slot.rank is None else f"{slot.key}.{slot.rank}"
             own = {name.removeprefix(f"{key}."): v for name, v in values.items() if name.startswith(f"{key}.")}
-            if "c10" in own and slot.table.youngs_modulus is None:
-                own.pop("youngs_modulus")
-            elif "c10" in own and "youngs_modulus" not in slot.table.model_fields_set:
+            given = slot.table.youngs_modulus is not None and "youngs_modulus" in slot.table.model_fields_set
+            if "c10" in own and not given:
                 own.pop("youngs_modulus")
             if slot.rank is None and own["poissons_ratio"] == slot.material.poissons_ratio:
                 own.pop("poissons_ratio")
@@ -170,11 +157,7 @@ class Unknowns:
 def chosen_to_fit(unknowns: Unknowns, hold: Sequence[str]) -> list[Unknown]:
     """Return the unknowns that are not held by name, or by the last part of it.
 
-    Raises
-    ------
-    FitError
-        A name that there is not, or nothing left.
-
+    Raises FitError for a name that there is not, or nothing left.
     """
     names = {u.name for u in unknowns.all}
     for name in hold:

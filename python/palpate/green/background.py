@@ -176,11 +176,7 @@ class BackgroundPrecompute:
     def wait(self, progress: Callable[[int, int], None] | None = None) -> GreensFunction:
         """Wait for the region that is computed first; what it gives may be touched there.
 
-        Raises
-        ------
-        BodyError
-            The computation has failed.
-
+        Raises BodyError if the computation has failed.
         """
         while True:
             with self._changed:
@@ -205,14 +201,7 @@ class BackgroundPrecompute:
             return unfetched
 
     def paint(self, nodes: Sequence[int] | np.ndarray) -> None:
-        """Let surface nodes be the next stage.
-
-        Raises
-        ------
-        BodyError
-            A node that is not on the surface.
-
-        """
+        """Let surface nodes be the next stage; BodyError for a node that is not on the surface."""
         surface = self.body.mesh.surface_nodes
         wanted = np.intersect1d(surface_region(self.body, np.asarray(nodes), "painted"), self._job.region)
         if self.is_complete or self.error is not None or not len(wanted):

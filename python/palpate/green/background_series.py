@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import os
 import subprocess
 import threading
@@ -37,8 +38,6 @@ class BackgroundSeries:
 
     Attributes
     ----------
-    done, places
-        Places that are computed, and in all of the jobs that have begun.
     error
         Why it has ended before all are; None while it has not.
 
@@ -146,7 +145,7 @@ class BackgroundSeries:
     ) -> tuple[float, ...] | None:
         """Send the point near which a tool is, when it has moved by more than its radius."""
         point = self._near(job)
-        if point is None or (last is not None and _distance(point, last) < job.radius):
+        if point is None or (last is not None and math.dist(point, last) < job.radius):
             return last
         assert child.stdin is not None
         with contextlib.suppress(OSError):  # it has ended meanwhile
@@ -196,7 +195,3 @@ def _arguments(job: SeriesJob) -> dict[str, object]:
 def _identity(path: Path) -> tuple[int, int]:
     status = path.stat()
     return status.st_ino, status.st_mtime_ns
-
-
-def _distance(one: Sequence[float], other: Sequence[float]) -> float:
-    return float(sum((a - b) ** 2 for a, b in zip(one, other, strict=True)) ** 0.5)

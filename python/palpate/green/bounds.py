@@ -24,11 +24,7 @@ def error_text(error: float) -> str:
 def check_error(error: float, precision: str, what: str, stacklevel: int) -> None:
     """Warn of an estimated relative error, or refuse it; ``what`` is wrong by it, ``stacklevel`` as seen from here.
 
-    Raises
-    ------
-    PrecisionError
-        Beyond :data:`REFUSED`.
-
+    Raises PrecisionError beyond :data:`REFUSED`.
     """
     # Not a number is refused, too.
     if not error <= REFUSED:

@@ -17,13 +17,7 @@ PAUSE = 0.1
 def claimed(target: Path, waiting: Callable[[], None]) -> Iterator[_native.StoreClaim]:
     """Claim the store at ``target`` until the block ends, as soon as no other process computes it.
 
-    ``waiting`` is called before every pause.
-
-    Raises
-    ------
-    OSError
-        No file can be written there.
-
+    ``waiting`` is called before every pause. Raises OSError if no file can be written there.
     """
     while (claim := _native.StoreClaim.take(target)) is None:
         waiting()

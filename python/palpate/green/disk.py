@@ -16,22 +16,12 @@ KEPT = {"f16": 4, "f32": 4, "f64": 8}
 
 @dataclass(frozen=True)
 class DiskUse:
-    """Bytes that a precomputation takes on the disk.
+    """Bytes that a precomputation takes on the disk."""
 
-    Attributes
-    ----------
-    store
-        The finished store.
-    partial
-        Finished blocks beside it, until it is finished. Of two entries that mirror each other one is kept.
-    before
-        The store of the stage before the last, which is replaced by rename.
-
-    """
-
-    store: int
+    store: int  # the finished store
+    # Finished blocks beside it, until it is finished. Of two entries that mirror each other one is kept.
     partial: int
-    before: int
+    before: int  # the store of the stage before the last, which is replaced by rename
 
     @property
     def peak(self) -> int:
@@ -48,14 +38,7 @@ class DiskUse:
 
 
 def require_room(target: Path, columns: int, rows: int, precision: str, in_stages: bool) -> None:
-    """Refuse a precomputation whose files have no room beside ``target``, and say what would.
-
-    Raises
-    ------
-    StoreError
-        With the numbers.
-
-    """
+    """Raise StoreError if the files of a precomputation have no room beside ``target``, and say what would."""
     free = free_bytes(target)
     needed = DiskUse.of(columns, rows, precision, in_stages)
     if needed.peak <= free:

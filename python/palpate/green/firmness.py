@@ -20,15 +20,8 @@ LEVEL = 0.02
 def firmness(green: GreensFunction, radius: float) -> float | None:
     """Stiffness of the softest of the highest touchable points over that of a half-space under a flat punch, ``2 E a``.
 
-    Poisson's ratio, which makes the half-space stiffer by a third at most, is left out.
-
-    Parameters
-    ----------
-    green
-        Of a body of one material, else the answer is None.
-    radius
-        Of the patch that is pressed, m.
-
+    Poisson's ratio, which makes the half-space stiffer by a third at most, is left out. The patch that is pressed has a
+    ``radius``, m. None for a body of several materials.
     """
     if green.youngs_modulus is None or not radius > 0:
         return None

@@ -413,11 +413,7 @@ class GreensFunction:
 def require_precise(green: GreensFunction, what: str) -> None:
     """Refuse a store in which touches may be wrong by more than 10 %, and warn of 1 %: before a loop runs on it.
 
-    Raises
-    ------
-    PrecisionError
-        The store is refused; ``what`` would be wrong.
-
+    The PrecisionError and the warning say that ``what`` would be wrong.
     """
     check_error(green.touch_error, green.precision, what, stacklevel=2)
 

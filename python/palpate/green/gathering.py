@@ -32,13 +32,8 @@ def precompute_on(
     """Write the Green's function that is claimed; whether a partial file of something else was thrown away.
 
     Every worker factorises the problem once. Finished blocks stand in ``<store>.partial``, and are kept whatever
-    happens to the cluster: the same call, here or without a cluster, goes on from them.
-
-    Raises
-    ------
-    ClusterError
-        Workers that fail, or a scheduler that is lost.
-
+    happens to the cluster: the same call, here or without a cluster, goes on from them. Raises ClusterError for workers
+    that fail, or a scheduler that is lost.
     """
     problem, precision = what.problem, what.precision
     job = worker.FactorRequest(what.key, _native.__version__, precision, memory)
@@ -88,11 +83,7 @@ def series_on(
 ) -> _native.Series:
     """Complete a series. Finished blocks are kept in its file, whatever happens to the cluster.
 
-    Raises
-    ------
-    ClusterError
-        Workers that fail, or a scheduler that is lost.
-
+    Raises ClusterError for workers that fail, or a scheduler that is lost.
     """
     gathered = file.gathering(problem)
     held = submit(client, worker.pass_through, problem)

@@ -26,34 +26,15 @@ from palpate.units import brief_repr
 
 @dataclass(frozen=True)
 class Job:
-    """A precomputation that may begin.
+    """A precomputation that may begin."""
 
-    Attributes
-    ----------
-    body
-        What it is of.
-    region
-        Surface nodes that may be touched, ascending.
-    problem
-        As the native module takes it.
-    first
-        Nodes that are computed first, as ranks among the surface nodes; empty for all at once.
-    key
-        Of the finished store.
-    target
-        Its file.
-    precision
-        As asked for; None lets the body choose.
-
-    """
-
-    body: Body
-    region: np.ndarray
-    problem: tuple[np.ndarray, ...]
-    first: np.ndarray
-    key: str
-    target: Path
-    precision: str | None
+    body: Body  # what it is of
+    region: np.ndarray  # surface nodes that may be touched, ascending
+    problem: tuple[np.ndarray, ...]  # as the native module takes it
+    first: np.ndarray  # nodes that are computed first, as ranks among the surface nodes; empty for all at once
+    key: str  # of the finished store
+    target: Path  # its file
+    precision: str | None  # as asked for; None lets the body choose
 
     @classmethod
     def of(
@@ -64,14 +45,7 @@ class Job:
         first: SurfaceRegion | None,
         path: str | os.PathLike[str] | None,
     ) -> Job:
-        """Check everything that can be checked before a number is computed.
-
-        Raises
-        ------
-        Error
-            See :func:`palpate.precompute`.
-
-        """
+        """Check everything that can be checked before a number is computed; errors as of :func:`palpate.precompute`."""
         if not isinstance(body, Body):
             raise BodyError(f"precompute takes a palpate.Body, got {brief_repr(body)}")
         body.require_supported()
@@ -127,14 +101,7 @@ class Job:
         return GreensFunction(_native.GreenCore.load(self.target), self.body)
 
     def allowed(self, memory: int | str | None) -> int | None:
-        """Bytes of memory that may be taken, once the files have room.
-
-        Raises
-        ------
-        Error
-            They have not, or nothing is left of the memory.
-
-        """
+        """Bytes of memory that may be taken, once the files have room; Error if they have not, or no memory is left."""
         in_stages = 0 < len(self.first) < len(self.region)
         require_room(self.target, 3 * len(self.region), self.rows, self.precision or "f16", in_stages)
         return available_memory() if memory is None else allowed_memory(memory)

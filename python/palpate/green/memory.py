@@ -19,12 +19,6 @@ def memory_in_use() -> int:
     return int(_PROCESS.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
-def peak_memory() -> int:
-    """Bytes that this process has held at its peak."""
-    lines = Path("/proc/self/status").read_text().splitlines()
-    return 1024 * int(next(line for line in lines if line.startswith("VmHWM")).split()[1])
-
-
 def available_memory() -> int | None:
     """Bytes that this machine can still give, as far as the system reports it; None where it does not."""
     if not _PROCESS.exists():
@@ -37,11 +31,7 @@ def available_memory() -> int | None:
 def allowed_memory(limit: int | str) -> int:
     """Bytes that may still be taken when the process as a whole may reach ``limit`` bytes, or text such as ``"8GB"``.
 
-    Raises
-    ------
-    BodyError
-        Nothing is left.
-
+    Raises BodyError if nothing is left.
     """
     total, used = memory_units(limit), memory_in_use()
     if not total > used:

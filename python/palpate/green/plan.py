@@ -29,26 +29,14 @@ CALIBRATION = 0.1
 
 @dataclass(frozen=True)
 class SeriesPlan:
-    """Counts of the series of a hyperelastic body below spheres of a radius.
+    """Counts of the series of a hyperelastic body below spheres of a radius."""
 
-    Attributes
-    ----------
-    radius
-        m.
-    places, missing
-        All places, and those that are not stored yet.
-    size
-        Bytes of the file.
-    seconds
-        Estimate of the time that the missing ones take on this machine, s.
-
-    """
-
-    radius: float
+    radius: float  # m
+    # All places, and those that are not stored yet.
     places: int
     missing: int
-    size: int
-    seconds: float
+    size: int  # bytes of the file
+    seconds: float  # estimate of the time that the missing ones take on this machine, s
 
     def __str__(self) -> str:
         """One line for people."""

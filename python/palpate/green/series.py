@@ -27,24 +27,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SeriesJob:
-    """The series of a body for spheres of one radius: what it is of, and its file.
+    """The series of a body for spheres of one radius: what it is of, and its file."""
 
-    Attributes
-    ----------
-    body
-        What it is of.
-    radius
-        m.
-    touchable
-        Surface nodes at which it is known, ascending.
-    store, key
-        File and key of the body's Green's function.
-
-    """
-
-    body: Body
-    radius: float
-    touchable: np.ndarray
+    body: Body  # what it is of
+    radius: float  # m
+    touchable: np.ndarray  # surface nodes at which it is known, ascending
+    # File and key of the body's Green's function.
     store: Path
     key: str
 
@@ -82,15 +70,8 @@ class SeriesJob:
         """Read the series from its file, and compute and store what is missing there.
 
         One process at a time computes it, the others wait. With ``dask`` the workers of a cluster compute, as in
-        :func:`palpate.precompute`.
-
-        Raises
-        ------
-        BodyError
-            A body that is not held.
-        ClusterError
-            A cluster that cannot be reached, has no workers or other versions, or fails.
-
+        :func:`palpate.precompute`. Raises BodyError for a body that is not held; ClusterError for a cluster that cannot
+        be reached, has no workers or other versions, or fails.
         """
         file = self.file()
 
@@ -123,36 +104,6 @@ def _has_series(body: Body) -> bool:
     return body.loads is None and body.is_hyperelastic
 
 
-def force_series(
-    green: GreensFunction, body: Body, radius: float, progress: Callable[[int, int], None] | None = None
-) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return the coefficients of the higher orders of the displacement below spheres of a radius, m, and their places.
-
-    They are read from the file beside the store, or computed and written there. None for a linear body, one with loads
-    and one whose store has no file.
-
-    Parameters
-    ----------
-    progress
-        Called with places done and all of them.
-
-    Returns
-    -------
-    fields, positions
-        (k, 9) and (k, 3), m, at the smooth sides of the surface nodes. With the outward normal `n` and the pressing
-        force `F = -n . f` of a force `f` on the body, `U = F^2 b_3 . f + F^3 b_4 . f` is added to its complementary
-        energy: `b_3` (m/N^2), `b_4` (m/N^3), `1/F_e` (1/N) of the force at which the series ends, and `kappa` (1/N^2)
-        and `alpha` (1/N) of a body that hardens, where `F^2` and `F^3` stand for functions that grow more slowly
-        (docs/theory.md, chapter 11).
-
-    """
-    job = SeriesJob.of(green, body, radius)
-    if job is None:
-        return None
-    series = job.compute(progress)
-    return series.fields, series.positions
-
-
 def series_beside(store: Path) -> list[Path]:
     """Files of series that lie beside a store."""
     return sorted(store.parent.glob(f"{glob.escape(store.stem)}.*.series.palpate"))
@@ -168,14 +119,7 @@ def lines_of_series(store: Path) -> Iterator[str]:
 
 
 def series_line(path: Path) -> str:
-    """One line about a file of series, for people.
-
-    Raises
-    ------
-    StoreError
-        A file that is damaged or of another version.
-
-    """
+    """One line about a file of series, for people; StoreError for a file that is damaged or of another version."""
     series = _native.Series.read(path)
     done = "all" if series.is_complete else f"{series.done:,} of"
     return f"series beyond small strain at {done} {series.places:,} places, {path.stat().st_size / 1e6:.2g} MB"

@@ -23,48 +23,22 @@ Arrays = tuple[np.ndarray, ...]
 
 @dataclass(frozen=True)
 class FactorRequest:
-    """What a worker is to factorise, beside the arrays of the problem.
+    """What a worker is to factorise, beside the arrays of the problem."""
 
-    Attributes
-    ----------
-    key
-        Of the operator.
-    version
-        Of Palpate, where the computation was started.
-    precision
-        Number format asked for; None: chosen by the body.
-    memory
-        Peak memory of a worker's process, such as ``"8GB"``; None: any.
-
-    """
-
-    key: str
-    version: str
-    precision: str | None
-    memory: int | str | None
+    key: str  # of the operator
+    version: str  # of Palpate, where the computation was started
+    precision: str | None  # number format asked for; None: chosen by the body
+    memory: int | str | None  # peak memory of a worker's process, such as ``"8GB"``; None: any
 
 
 @dataclass(frozen=True)
 class SeriesRequest:
-    """What a worker is to factorise for a series, beside the arrays of the problem.
+    """What a worker is to factorise for a series, beside the arrays of the problem."""
 
-    Attributes
-    ----------
-    key
-        Of the series.
-    version
-        Of Palpate, where the computation was started.
-    laws
-        Of the material, and that of each element.
-    radius
-        Of the tool, m.
-
-    """
-
-    key: str
-    version: str
-    laws: tuple[list[tuple[str, float, float]], np.ndarray]
-    radius: float
+    key: str  # of the series
+    version: str  # of Palpate, where the computation was started
+    laws: tuple[list[tuple[str, float, float]], np.ndarray]  # of the material, and that of each element
+    radius: float  # of the tool, m
 
 
 @dataclass
@@ -138,11 +112,7 @@ def measure(problem: Arrays, job: FactorRequest) -> tuple[tuple[Any, ...], bytes
 def solve(problem: Arrays, job: FactorRequest, order: bytes, block: int, width: int) -> tuple[bytes, bytes]:
     """Panel of a block of ``width`` columns, and its checksum.
 
-    Raises
-    ------
-    ClusterError
-        This machine orders rows and columns otherwise: its blocks are of other columns.
-
+    Raises ClusterError if this machine orders rows and columns otherwise: its blocks are of other columns.
     """
     factor = _factorize(problem, job)
     _require_order(factor.order, order, "columns")
@@ -152,11 +122,7 @@ def solve(problem: Arrays, job: FactorRequest, order: bytes, block: int, width: 
 def solve_series(problem: Arrays, job: SeriesRequest, order: bytes, block: int) -> tuple[bytes, bytes]:
     """Coefficients of a series at a block of places, and their checksum.
 
-    Raises
-    ------
-    ClusterError
-        This machine orders the places otherwise.
-
+    Raises ClusterError if this machine orders the places otherwise.
     """
     require_version(job.version, _address())
     factor = _factors.get(job.key, lambda: _native.SeriesBlocks(problem, job.laws, job.radius, threads()))

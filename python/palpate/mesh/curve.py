@@ -25,15 +25,8 @@ Projection = Callable[[np.ndarray], np.ndarray]
 def curve(mesh: TetMesh, project: Projection, inner: tuple[np.ndarray, Projection] | None = None) -> TetMesh:
     """10-node tetrahedra, the middles of surface edges on a shape, or as near as folds no element.
 
-    Parameters
-    ----------
-    mesh
-        4-node tetrahedra.
-    project
-        Points (p, 3), m, onto the shape.
-    inner
-        Faces (k, 3) within the body, and the projection of the middles of their edges, if there are any.
-
+    ``project`` takes points (p, 3), m, onto the shape. ``inner`` are faces (k, 3) within the body, and the projection
+    of the middles of their edges, if there are any.
     """
 
     def folded(nodes: np.ndarray, tets: np.ndarray) -> np.ndarray:
@@ -48,15 +41,8 @@ def refine(mesh: TetMesh, project: Callable[[np.ndarray], np.ndarray]) -> TetMes
     """Eight 4-node tetrahedra for each of a mesh, new surface nodes on a shape, or as near as flattens no element.
 
     A tetrahedron is cut at the middles of its edges. The octahedron that is left inside is cut along its shortest
-    diagonal (Bey 1995; Zhang 1995). However often that is done, angles do not go to zero.
-
-    Parameters
-    ----------
-    mesh
-        4-node tetrahedra.
-    project
-        Points (p, 3), m, onto the shape.
-
+    diagonal (Bey 1995; Zhang 1995). However often that is done, angles do not go to zero. ``project`` takes points (p,
+    3), m, onto the shape.
     """
 
     def flattened(nodes: np.ndarray, tets: np.ndarray) -> np.ndarray:

@@ -14,23 +14,10 @@ HEAD, TAIL = 4096, 4096
 
 
 def require_whole(path: Path, triangles: int) -> None:
-    """Refuse a file that holds fewer faces than its header counts, or an STL text without its end.
+    """Raise MeshError for a file with fewer faces than its header counts, or an STL text without its end.
 
-    Polygons are cut into triangles, so that a whole file has at least as many triangles as faces. Binary files are
-    refused by their readers.
-
-    Parameters
-    ----------
-    path
-        The file.
-    triangles
-        How many were read from it.
-
-    Raises
-    ------
-    MeshError
-        A file that is cut short.
-
+    Polygons are cut into triangles, so that a whole file has at least as many ``triangles``, which were read, as faces.
+    Binary files are refused by their readers.
     """
     with path.open("rb") as file:
         head = file.read(HEAD)

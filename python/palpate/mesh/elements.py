@@ -96,11 +96,7 @@ def _face_keys(corners: np.ndarray) -> np.ndarray:
 def boundary_faces(tets: np.ndarray) -> np.ndarray:
     """Faces of one element only, outward, in the elements' order: (k, 3), or (k, 6) of 10-node elements.
 
-    Raises
-    ------
-    MeshError
-        A face of more than two elements.
-
+    Raises MeshError for a face of more than two elements.
     """
     of_element = FACES[tets.shape[1]]
     return tets[:, of_element].reshape(-1, of_element.shape[1])[_boundary_ranks(tets)]

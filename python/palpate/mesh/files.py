@@ -48,25 +48,12 @@ REGION_NAMES = ("region", "gmsh:physical", "medit:ref")
 
 @dataclass(frozen=True, eq=False)
 class Volume:
-    """What a volume mesh file holds, not checked.
+    """What a volume mesh file holds, not checked."""
 
-    Attributes
-    ----------
-    nodes
-        (n, 3), m in memory, in the file's unit of length on its way to or from it.
-    tets
-        (m, 4) or (m, 10) node indices.
-    regions
-        (m,) integer labels.
-    region_names
-        Labels by name.
-
-    """
-
-    nodes: np.ndarray
-    tets: np.ndarray
-    regions: np.ndarray
-    region_names: Mapping[str, int]
+    nodes: np.ndarray  # (n, 3), m in memory, in the file's unit of length on its way to or from it
+    tets: np.ndarray  # (m, 4) or (m, 10) node indices
+    regions: np.ndarray  # (m,) integer labels
+    region_names: Mapping[str, int]  # labels by name
 
     @property
     def is_quadratic(self) -> bool:

@@ -21,26 +21,14 @@ PARTS = {"linear": 15.0, "quadratic": 7.5}
 
 @dataclass(frozen=True)
 class FillOptions:
-    """How a surface is filled.
+    """How a surface is filled."""
 
-    Attributes
-    ----------
-    mesher
-        ``"netgen"`` on the surface itself, ``"wrap"``: a new surface around what the triangles enclose, filled by
-        fTetWild; None: NETGEN where the surface is closed, of one part, and not hard for it.
-    part
-        Part of the solid by its rank in volume, from 1 on, or ``"all"``, for a surface that is wrapped.
-    max_volume_loss
-        Share of the volume that a wrapped mesh may lose, or text such as ``"10%"``.
-    segments
-        Names or labels of the segments of a label map.
-
-    """
-
+    # ``"netgen"`` on the surface itself, ``"wrap"``: a new surface around what the triangles enclose, filled by
+    # fTetWild; None: NETGEN where the surface is closed, of one part, and not hard for it.
     mesher: Mesher | None = None
-    part: Which = 1
-    max_volume_loss: float | str = 0.05
-    segments: tuple[str | int, ...] = ()
+    part: Which = 1  # part of the solid by its rank in volume, from 1 on, or ``"all"``, for a surface that is wrapped
+    max_volume_loss: float | str = 0.05  # share of the volume that a wrapped mesh may lose, or text such as ``"10%"``
+    segments: tuple[str | int, ...] = ()  # names or labels of the segments of a label map
 
     def __post_init__(self) -> None:
         if self.mesher not in (None, "netgen", "wrap"):
@@ -55,31 +43,14 @@ class FillOptions:
 
 @dataclass(frozen=True, eq=False)
 class FillJob:
-    """What every mesher is asked for.
+    """What every mesher is asked for."""
 
-    Attributes
-    ----------
-    element
-        What the surface is filled with.
-    size
-        Longest edge wanted, m; None: chosen by the shape.
-    refine
-        Finer balls.
-    options
-        Which mesher, which parts, and what may be lost.
-    time_limit
-        Of a mesher, s, in all its runs.
-    stage
-        Is called with the name of what is being done.
-
-    """
-
-    element: Element
-    size: float | None
-    refine: Sequence[Ball]
-    options: FillOptions
-    time_limit: float
-    stage: Callable[[str], None]
+    element: Element  # what the surface is filled with
+    size: float | None  # longest edge wanted, m; None: chosen by the shape
+    refine: Sequence[Ball]  # finer balls
+    options: FillOptions  # which mesher, which parts, and what may be lost
+    time_limit: float  # of a mesher, s, in all its runs
+    stage: Callable[[str], None]  # is called with the name of what is being done
 
 
 def length_text(metres: float) -> str:

@@ -24,67 +24,33 @@ REPORT = "report.jsonl"
 
 @dataclass(frozen=True, eq=False)
 class ReadFile:
-    """What is known of a file once it is read.
+    """What is known of a file once it is read."""
 
-    Attributes
-    ----------
-    file
-        Its name.
-    sides
-        Of the box around the body, in the file's unit.
-    unit
-        Unit of length that it is taken in.
-    fitting
-        Units that it may be in, the likeliest first; one alone is certain.
-    vertices, faces
-        Triangles of a surface, m; None for a volume mesh.
-
-    """
-
-    file: str
-    sides: tuple[float, float, float]
-    unit: str
-    fitting: tuple[str, ...]
+    file: str  # its name
+    sides: tuple[float, float, float]  # of the box around the body, in the file's unit
+    unit: str  # unit of length that it is taken in
+    fitting: tuple[str, ...]  # units that it may be in, the likeliest first; one alone is certain
+    # Triangles of a surface, m; None for a volume mesh.
     vertices: np.ndarray | None = None
     faces: np.ndarray | None = None
 
 
 @dataclass
 class FillProcess:
-    """A file that is read and filled in a child process.
+    """A file that is read and filled in a child process."""
 
-    Attributes
-    ----------
-    folder
-        Where the file lies, and what is made of it.
-    file
-        Its name there.
-    unit
-        Unit of length; None takes the likeliest.
-    on_read
-        Is called once the file is read: its surface can be drawn.
-    on_stage
-        Is called with the name of each stage, and with the stages done and all of them.
-    notes
-        What the meshers reported, a line each.
-
-    """
-
-    folder: Path
+    folder: Path  # where the file lies, and what is made of it
     file: str
-    unit: str | None
-    on_read: Callable[[ReadFile], None]
+    unit: str | None  # unit of length; None takes the likeliest
+    on_read: Callable[[ReadFile], None]  # is called once the file is read: its surface can be drawn
+    # Is called with the name of each stage, and with the stages done and all of them.
     on_stage: Callable[[str, int, int], None]
-    notes: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)  # what the meshers reported, a line each
 
     def mesh(self, require_wanted: Callable[[], None] = lambda: None) -> TetMesh:
         """Fill the file; ``require_wanted`` is called ten times a second, and ends the process by raising.
 
-        Raises
-        ------
-        MeshError
-            A file that cannot be read or filled, and why.
-
+        Raises MeshError for a file that cannot be read or filled, and why.
         """
         report = self.folder / REPORT
         for left in (report, self.folder / SURFACE, self.folder / MESH):

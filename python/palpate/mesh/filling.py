@@ -50,24 +50,12 @@ class MesherFailedError(MeshError):
 
 @dataclass(frozen=True, eq=False)
 class Filling:
-    """What is to be filled, and how.
+    """What is to be filled, and how."""
 
-    Attributes
-    ----------
-    name
-        Of the surface in messages.
-    surface
-        The surface, m, and what is known of it.
-    job
-        What is asked for.
-    processor_limit
-        Of one run, s of processor time, which other programs do not change; None: as long as it takes.
-
-    """
-
-    name: str
-    surface: SurfaceState
+    name: str  # of the surface in messages
+    surface: SurfaceState  # the surface, m, and what is known of it
     job: FillJob
+    # Of one run, s of processor time, which other programs do not change; None: as long as it takes.
     processor_limit: float | None = None
 
     @property
@@ -81,14 +69,7 @@ class Filling:
         return float(np.ptp(self.shape.vertices, axis=0).max())
 
     def mesh(self) -> TetMesh:
-        """Fill the surface.
-
-        Raises
-        ------
-        MeshError
-            A mesher that failed, or a mesh that loses a part of the body, and why.
-
-        """
+        """Fill the surface; MeshError for a mesher that failed, or a mesh that loses a part of the body, and why."""
         size = self.extent / PARTS[self.job.element] if self.job.size is None else self.job.size
         halvings = self._halvings(size)
         found: tuple[TetMesh, Fit] | None = None

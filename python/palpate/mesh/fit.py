@@ -31,21 +31,11 @@ MARGIN = 0.9
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A mesh beside the surface it was made from.
+    """A mesh beside the surface it was made from."""
 
-    Attributes
-    ----------
-    loss
-        Share of the volume that is missing; negative where there is more.
-    order
-        Power of the size by which gaps fall.
-    points, gaps
-        (k, 3) places spread evenly over the surface, and their distances (k,) to that of the mesh, m.
-
-    """
-
-    loss: float
-    order: float
+    loss: float  # share of the volume that is missing; negative where there is more
+    order: float  # power of the size by which gaps fall
+    # (k, 3) places spread evenly over the surface, and their distances (k,) to that of the mesh, m.
     points: np.ndarray
     gaps: np.ndarray
 

@@ -34,11 +34,7 @@ def is_first_format(path: Path) -> bool:
 def read_first_format(path: Path) -> meshio.Mesh:
     """Read nodes and solid elements; the physical number of an element is its region.
 
-    Raises
-    ------
-    MeshError
-        A file that is cut short or has elements of another kind, with the line.
-
+    Raises MeshError for a file that is cut short or has elements of another kind, with the line.
     """
     import meshio
 

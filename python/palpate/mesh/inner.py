@@ -22,26 +22,14 @@ POINTS = np.vstack([np.full((1, 4), 0.25), 0.125 + 0.5 * np.eye(4)])
 
 @dataclass(frozen=True, eq=False)
 class InnerRegion:
-    """A part of the body with a boundary of its own.
+    """A part of the body with a boundary of its own."""
 
-    Attributes
-    ----------
-    name
-        Of the region in the mesh.
-    vertices, faces
-        Triangles of its boundary, (n, 3) m and (k, 3).
-    inside
-        Whether points (k, 3), m, lie within.
-    size
-        Size of the elements there, m.
-
-    """
-
-    name: str
+    name: str  # of the region in the mesh
+    # Triangles of its boundary, (n, 3) m and (k, 3).
     vertices: np.ndarray
     faces: np.ndarray
-    inside: Callable[[np.ndarray], np.ndarray]
-    size: float
+    inside: Callable[[np.ndarray], np.ndarray]  # whether points (k, 3), m, lie within
+    size: float  # size of the elements there, m
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,22 +62,15 @@ class InnerRegions:
         return TetMesh(mesh.nodes, mesh.tets, counts.argmax(axis=0), self.names())
 
     def require_elements(self, name: str, mesh: TetMesh) -> None:
-        """Refuse a mesh in which a region has no element.
-
-        Raises
-        ------
-        MeshError
-            The first of them.
-
-        """
+        """Raise MeshError with the first region that has no element in a mesh."""
         there = set(np.unique(mesh.regions).tolist())
         for title, number in self.names().items():
             if number not in there:
                 raise MeshError(f"{name}: segment '{title}' is too small for the elements; --max-size makes finer ones")
 
     def snapped(self, mesh: TetMesh) -> TetMesh:
-        """Put nodes between regions onto the boundaries, as far as no element becomes bad."""
-        return snap(mesh, self.project, _nodes_between(mesh))
+        """Put inner nodes between regions onto the boundaries, as far as no element becomes bad."""
+        return snap(mesh, self.project, np.setdiff1d(faces_between(mesh), mesh.surface_nodes))
 
     def project(self, points: np.ndarray) -> np.ndarray:
         """Closest points on the boundary that is nearest; a point that is far from all stays."""
@@ -110,8 +91,3 @@ def faces_between(mesh: TetMesh) -> np.ndarray:
     corners = corners[order]
     same = (corners[1:] == corners[:-1]).all(axis=1) & (regions[1:] != regions[:-1])
     return corners[1:][same]
-
-
-def _nodes_between(mesh: TetMesh) -> np.ndarray:
-    """Corners between regions that are not on the surface."""
-    return np.setdiff1d(np.unique(faces_between(mesh)), mesh.surface_nodes)

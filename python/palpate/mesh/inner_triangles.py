@@ -57,14 +57,7 @@ def within_surface(points: np.ndarray, vertices: np.ndarray, faces: np.ndarray) 
 
 
 def simplified(vertices: np.ndarray, faces: np.ndarray, moved: float) -> Triangles:
-    """Fewer triangles that lie at most this far off.
-
-    Raises
-    ------
-    ValueError
-        Triangles that bound no manifold, and why.
-
-    """
+    """Fewer triangles that lie at most this far off; ValueError for triangles that bound no manifold, and why."""
     from manifold3d import Error, Manifold, Mesh
 
     solid = Manifold(Mesh(np.asarray(vertices, dtype=np.float32), np.asarray(faces, dtype=np.uint32)))

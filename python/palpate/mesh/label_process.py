@@ -25,11 +25,7 @@ def label_arrays(
 ) -> dict[str, np.ndarray]:
     """``summary`` or ``boundaries`` of a segmentation, by :mod:`palpate.segmentation.child`.
 
-    Raises
-    ------
-    MeshError
-        A file that cannot be read, or a segment that it does not have.
-
+    Raises MeshError for a file that cannot be read, or a segment that it does not have.
     """
     require_file(Path(path), MeshError)
     with tempfile.TemporaryDirectory(prefix="palpate-") as folder:

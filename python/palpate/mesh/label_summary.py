@@ -38,11 +38,7 @@ def label_summary(
 ) -> LabelSummary:
     """Summary of a segmentation, with the bounds of filling it; ``segments`` are looked for.
 
-    Raises
-    ------
-    MeshError
-        A file that cannot be read, or a segment that it does not have.
-
+    Raises MeshError for a file that cannot be read, or a segment that it does not have.
     """
     found = label_arrays("summary", path, unit, segments, time_limit)
     rows = zip(*(found[name].tolist() for name in ("names", "values", "voxels")), strict=True)

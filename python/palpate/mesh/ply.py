@@ -39,11 +39,7 @@ def has_strips(path: Path) -> bool:
 def read_ply(path: Path) -> tuple[np.ndarray, np.ndarray]:
     """Read vertices (n, 3) and triangles (k, 3); polygons are cut into fans, strips into triangles.
 
-    Raises
-    ------
-    ValueError
-        A header that cannot be read, a file that is cut short, or one without triangles.
-
+    Raises ValueError for a header that cannot be read, a file that is cut short, or one without triangles.
     """
     head, order, body = _header(path.read_bytes())
     source = _Text(body) if order is None else _Binary(body, order)

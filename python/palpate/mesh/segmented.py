@@ -30,13 +30,8 @@ THINNEST = 0.05
 def segmented(path: str | os.PathLike[str], unit: str | None, job: FillJob, drawn: Draw | None = None) -> TetMesh:
     """Fill chosen segments of a label map; several become regions with their names.
 
-    ``drawn`` is called with the boundary, vertices (k, 3), m, and triangles, before it is filled.
-
-    Raises
-    ------
-    MeshError
-        A file that cannot be read, a segment that is not there or empty, or what :class:`Wrapping` raises.
-
+    ``drawn`` is called with the boundary, vertices (k, 3), m, and triangles, before it is filled. Raises MeshError for
+    a file that cannot be read, a segment that is not there or empty, or what :class:`Wrapping` raises.
     """
     import trimesh
 

@@ -79,11 +79,7 @@ class HalfSpace:
 def elements_inside(shape: Shape, nodes: np.ndarray, tets: np.ndarray) -> np.ndarray:
     """Mask of the elements (m,) whose centroid lies in a solid.
 
-    Raises
-    ------
-    MeshError
-        None does, or a function returns anything but a mask.
-
+    Raises MeshError if none does, or if a function returns anything but a mask.
     """
     inside = np.asarray(shape(nodes[tets[:, :4]].mean(axis=1)))
     if inside.shape != (len(tets),) or inside.dtype != bool:

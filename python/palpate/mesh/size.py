@@ -24,24 +24,10 @@ def size_text(extents: Sequence[float] | np.ndarray) -> str:
 
 
 def scale_of(name: str, positions: np.ndarray, unit: str | None) -> float:
-    """Metres in the unit of length of a file, which is metres if none is given.
+    """Metres in the unit of length of a file, which is metres if none is given; ``positions`` (k, 3) are in its unit.
 
-    Parameters
-    ----------
-    name
-        The file, in messages.
-    positions
-        (k, 3) in its unit.
-    unit
-        As the user gave it.
-
-    Raises
-    ------
-    UnitError
-        A unit that is not a length.
-    UnclearUnitError
-        No unit is given, and in metres the body is not between a millimetre and three metres long.
-
+    Raises UnitError for a unit that is not a length. Without one UnclearUnitError is raised, where in metres the body
+    is not between a millimetre and three metres long.
     """
     scale = length_scale("m" if unit is None else unit)
     extents = np.ptp(positions, axis=0) if len(positions) else np.zeros(3)

@@ -20,15 +20,8 @@ ROUNDS = 3
 def snap(mesh: TetMesh, project: Callable[[np.ndarray], np.ndarray], moving: np.ndarray | None = None) -> TetMesh:
     """4-node tetrahedra with their surface nodes on a shape, or as near as keeps every element's dihedral angles.
 
-    Parameters
-    ----------
-    mesh
-        4-node tetrahedra.
-    project
-        Points (p, 3), m, onto the shape; one that has no place there stays.
-    moving
-        Nodes (k,) that are moved; None: those on the surface.
-
+    ``project`` takes points (p, 3), m, onto the shape; one that has no place there stays. The nodes ``moving`` (k,) are
+    moved; None: those on the surface.
     """
     nodes, tets, moving = mesh.nodes.copy(), mesh.tets, mesh.surface_nodes if moving is None else moving
     least = LEAST_MOVE * np.linalg.norm(nodes[tets[:, 0]] - nodes[tets[:, 1]], axis=1).mean()

@@ -33,11 +33,7 @@ def load_stl(path: Path) -> trimesh.Trimesh:
 def read_stl(path: Path) -> tuple[np.ndarray, np.ndarray]:
     """Read vertices (3 k, 3) and triangles (k, 3) of text between comments, or of a binary with bytes behind it.
 
-    Raises
-    ------
-    ValueError
-        A number that cannot be read, or corners that are no whole triangles.
-
+    Raises ValueError for a number that cannot be read, or corners that are no whole triangles.
     """
     content = path.read_bytes()
     count = int(np.frombuffer(content, "<u4", 1, HEADER - 4)[0]) if len(content) > HEADER else 0

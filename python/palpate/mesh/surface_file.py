@@ -27,21 +27,11 @@ SURFACE_ENDINGS = (".stl", ".obj", ".ply", ".off", ".glb", ".gltf")
 
 @dataclass(frozen=True, eq=False)
 class SurfaceFile:
-    """Triangles of a file in its own unit of length, not checked.
+    """Triangles of a file in its own unit of length, not checked."""
 
-    Attributes
-    ----------
-    name
-        Of the surface in messages.
-    shape
-        The triangles.
-    part_names, part_of_face
-        Names of the meshes that the file holds, where it names several, and for each triangle the index of its own.
-
-    """
-
-    name: str
+    name: str  # of the surface in messages
     shape: trimesh.Trimesh
+    # Names of the meshes that the file holds, where it names several, and for each triangle the index of its own.
     part_names: tuple[str, ...] = ()
     part_of_face: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
@@ -49,11 +39,7 @@ class SurfaceFile:
 def load_surface(surface: str | os.PathLike[str] | trimesh.Trimesh | SurfaceFile) -> SurfaceFile:
     """Read a file, or take a surface of a program, or one that was read.
 
-    Raises
-    ------
-    MeshError
-        A file that is missing, cut short, cannot be read, or holds no triangles.
-
+    Raises MeshError for a file that is missing, cut short, cannot be read, or holds no triangles.
     """
     import trimesh
 

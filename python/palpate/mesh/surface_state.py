@@ -27,26 +27,14 @@ BY_HAND = "mend it in Blender or MeshLab"
 
 @dataclass(frozen=True, eq=False)
 class SurfaceState:
-    """A surface without doubles, and its topology.
-
-    Attributes
-    ----------
-    shape
-        The surface.
-    open_edges, crowded_edges
-        How many edges have one triangle, and more than two.
-    consistent
-        Whether neighbours agree on which side is outside.
-    bodies
-        How many separate surfaces there are.
-
-    """
+    """A surface without doubles, and its topology."""
 
     shape: trimesh.Trimesh
+    # How many edges have one triangle, and more than two.
     open_edges: int
     crowded_edges: int
-    consistent: bool
-    bodies: int
+    consistent: bool  # whether neighbours agree on which side is outside
+    bodies: int  # how many separate surfaces there are
 
     @classmethod
     def of(cls, shape: trimesh.Trimesh) -> SurfaceState:
@@ -107,14 +95,7 @@ class SurfaceState:
 
 
 def require_closed(name: str, shape: trimesh.Trimesh, hint: str = BY_HAND) -> SurfaceState:
-    """State of a closed surface of one part, its volume positive.
-
-    Raises
-    ------
-    MeshError
-        A surface that is not, and why.
-
-    """
+    """State of a closed surface of one part, its volume positive; MeshError for any other, and why."""
     require_finite(name, shape)
     state = SurfaceState.of(shape)
     fault = state.fault()

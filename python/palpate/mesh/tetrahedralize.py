@@ -181,11 +181,7 @@ def _filled(given: SurfaceFile, job: FillJob) -> TetMesh:
 def _chosen(given: SurfaceFile, options: FillOptions) -> tuple[SurfaceState | None, str]:
     """Return the closed surface for NETGEN; or None, and why the surface is to be wrapped, after "the surface".
 
-    Raises
-    ------
-    MeshError
-        A surface that NETGEN is asked for and cannot fill.
-
+    Raises MeshError for a surface that NETGEN is asked for and cannot fill.
     """
     if options.mesher == "netgen":
         hint = f"{BY_HAND}, or leave out mesher = 'netgen': then it is wrapped"
@@ -205,25 +201,14 @@ def _chosen(given: SurfaceFile, options: FillOptions) -> tuple[SurfaceState | No
 
 
 def read_surface(path: str | os.PathLike[str]) -> trimesh.Trimesh:
-    """Read a surface as it is, in its own unit.
-
-    Raises
-    ------
-    MeshError
-        A file that is missing or cannot be read.
-
-    """
+    """Read a surface as it is, in its own unit; MeshError for a file that is missing or cannot be read."""
     return load_surface(path).shape
 
 
 def closed_surface(path: str | os.PathLike[str]) -> trimesh.Trimesh:
     """Read a closed surface of one part, in its own unit.
 
-    Raises
-    ------
-    MeshError
-        A file that is missing or cannot be read, or a surface that is open, crossed or empty.
-
+    Raises MeshError for a file that is missing or cannot be read, or a surface that is open, crossed or empty.
     """
     loaded = load_surface(path)
     return require_closed(loaded.name, loaded.shape).shape

@@ -47,51 +47,25 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class Wrap:
-    """What was wrapped.
+    """What was wrapped."""
 
-    Attributes
-    ----------
-    vertices, faces
-        Of the closed manifold (n, 3), (k, 3).
-    parts
-        Of the solid, the largest first.
-    volume
-        Of the wanted parts, by the winding number or exactly.
-    cell
-        Of the grid.
-    points
-        Points (k, 3) of the given surface beside the wrap.
-    lost_points
-        Points (k, 3) of walls that the grid lost.
-    lost_share
-        Of the surface of what is wanted.
-    closed_share
-        Of the wrap that closes holes: no triangle of the surface is near.
-    band
-        Mask of the points within so many cells of the wrap.
-
-    """
-
+    # Of the closed manifold (n, 3), (k, 3).
     vertices: np.ndarray
     faces: np.ndarray
-    parts: list[Part]
-    volume: float
-    cell: float
-    points: np.ndarray
-    lost_points: np.ndarray
-    lost_share: float
-    closed_share: float
-    band: Grid
+    parts: list[Part]  # of the solid, the largest first
+    volume: float  # of the wanted parts, by the winding number or exactly
+    cell: float  # of the grid
+    points: np.ndarray  # points (k, 3) of the given surface beside the wrap
+    lost_points: np.ndarray  # points (k, 3) of walls that the grid lost
+    lost_share: float  # of the surface of what is wanted
+    closed_share: float  # of the wrap that closes holes: no triangle of the surface is near
+    band: Grid  # mask of the points within so many cells of the wrap
 
 
 def wrap(field: SolidField, labels: np.ndarray, part: int | None, cells: int) -> Wrap:
     """Wrap a part by its rank, or all of them (None), on a grid of so many cells or more along the longest side.
 
-    Raises
-    ------
-    WrapError
-        Triangles without an inside, or fewer parts.
-
+    Raises WrapError for triangles without an inside, or fewer parts.
     """
     moved = SIMPLIFIED / cells
     while True:
@@ -129,14 +103,7 @@ def _wrap(field: SolidField, labels: np.ndarray, part: int | None, cells: int, m
 
 
 def _require_one_side(field: SolidField, cell: float) -> None:
-    """Refuse a sheet: what it encloses lies on both of its sides.
-
-    Raises
-    ------
-    WrapError
-        With the reason.
-
-    """
+    """Raise WrapError for a sheet: what it encloses lies on both of its sides."""
     points, normals = field.samples(SAMPLES)
     before, behind = (field.winding(points + sign * 0.05 * cell * normals) > 0.5 for sign in (1, -1))
     bounding = before != behind

@@ -25,6 +25,7 @@ from palpate.mesh.surface_file import SurfaceFile
 from palpate.mesh.surface_state import SurfaceState
 from palpate.mesh.tetmesh import TetMesh
 from palpate.mesh.triangles import closest_on
+from palpate.vectors import place_text
 
 # Cells of the grid along the longest side, at least and at most, and in an element.
 CELLS, MOST_CELLS, CELLS_IN_ELEMENT = 80, 200, 5.0
@@ -43,25 +44,12 @@ INSTALL = "Install it by 'pip install pytetwild' (for Linux and Windows)"
 
 @dataclass(frozen=True, eq=False)
 class Wrapping:
-    """What is to be wrapped and filled, and how.
+    """What is to be wrapped and filled, and how."""
 
-    Attributes
-    ----------
-    surface
-        Triangles, m.
-    reason
-        Why it is wrapped, after "the surface".
-    job
-        What is asked for.
-    inner
-        Regions whose boundaries elements follow.
-
-    """
-
-    surface: SurfaceFile
-    reason: str
+    surface: SurfaceFile  # triangles, m
+    reason: str  # why it is wrapped, after "the surface"
     job: FillJob
-    inner: InnerRegions | None = None
+    inner: InnerRegions | None = None  # regions whose boundaries elements follow
 
     @property
     def name(self) -> str:
@@ -71,12 +59,8 @@ class Wrapping:
     def mesh(self) -> TetMesh:
         """Fill what the surface encloses.
 
-        Raises
-        ------
-        MeshError
-            A surface without an inside, a part that is not there, a mesher that failed, or a mesh that loses more of
-            the volume than allowed.
-
+        Raises MeshError for a surface without an inside, a part that is not there, a mesher that failed, or a mesh that
+        loses more of the volume than allowed.
         """
         points = np.asarray(self.surface.shape.vertices)
         origin, extent = points.min(axis=0), float(np.ptp(points, axis=0).max())
@@ -188,10 +172,10 @@ class Wrapping:
         if wrap.closed_share > LEAST_CLOSED_SHARE:
             self._warn(f"{100 * wrap.closed_share:.0f} % of the new surface closes holes, where its shape is a guess")
         if wrap.lost_share > LEAST_LOST_SHARE:
-            place = wrap.lost_points[0]
+            place = place_text(1e3 * wrap.lost_points[0], "mm")
             self._warn(
                 f"walls thinner than about {length_text(2 * wrap.cell)} were lost, {100 * wrap.lost_share:.1f} % of "
-                f"the surface, as near ({', '.join(f'{1e3 * x:.4g}' for x in place)}) mm"
+                f"the surface, as near {place}"
             )
 
     def _report_parts(self, wrap: _Wrapped) -> None:
@@ -203,9 +187,9 @@ class Wrapping:
         for rank in left_out[:MOST_NAMED]:
             volume, middle, sides, label = wrap.parts[rank]
             title = f", '{self.surface.part_names[label]}'" if label >= 0 else ""
-            place = ", ".join(f"{1e3 * x:.4g}" for x in middle)
+            place = place_text(1e3 * middle, "mm")
             self._warn(
-                f"part {rank + 1} of {len(wrap.parts)}{title} ({size_text(sides)} around ({place}) mm, "
+                f"part {rank + 1} of {len(wrap.parts)}{title} ({size_text(sides)} around {place}, "
                 f"{100 * volume / total:.2g} % of the volume) was left out; --part {rank + 1} or --part all takes it"
             )
         if len(left_out) > MOST_NAMED:

@@ -14,14 +14,7 @@ MILLIMETRES = 1e3
 
 
 class Axes:
-    """Conversion between a scene (m, RAS) and the wire (mm, RAS or LPS), in whose world the scene may stand anywhere.
-
-    Parameters
-    ----------
-    name
-        Axes of the wire.
-
-    """
+    """Conversion of a scene (m, RAS) to the wire (mm, RAS or LPS), in whose world the scene may stand anywhere."""
 
     def __init__(self, name: Literal["RAS", "LPS"] = "RAS"):
         self.name = name

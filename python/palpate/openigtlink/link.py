@@ -35,19 +35,11 @@ class Link:
     """A simulation as peers see it.
 
     In: TRANSFORM ``Tool`` or ``Tool0`` to ``Tool3`` moves a tool. TRANSFORM ``Body`` is the pose of the scene in the
-    peer's world. STRING ``Command`` is ``reset``, or ``surface``, which writes the deformed surface to a file.
-    Out: TRANSFORM ``ToolPose`` (``ToolPose1``...), POINT ``Contacts``, STRING ``Force`` (JSON in N and N m, axes of the
-    wire) and STRING ``Answer``.
+    peer's world. STRING ``Command`` is ``reset``, or ``surface``, which writes the deformed surface to a file of
+    ``folder``. Out: TRANSFORM ``ToolPose`` (``ToolPose1``...), POINT ``Contacts``, STRING ``Force`` (JSON in N and N m,
+    axes of the wire) and STRING ``Answer``.
 
-    Parameters
-    ----------
-    simulation
-        Gives the simulation that runs now; None where none does.
-    axes
-        Of the wire.
-    folder
-        Where ``surface`` writes.
-
+    ``simulation`` gives the simulation that runs now, None where none does.
     """
 
     def __init__(self, simulation: Callable[[], Simulation | None], axes: Axes | None = None, folder: Path = Path()):
@@ -58,11 +50,7 @@ class Link:
     def take(self, peer: object, message: Message, now: float) -> bytes | None:
         """Do what a message says; an answer for its peer alone, or None. What Palpate does not know is left alone.
 
-        Raises
-        ------
-        MessageError
-            A message whose content is wrong.
-
+        Raises MessageError for a message whose content is wrong.
         """
         simulation = self._simulation()
         if message.kind == "TRANSFORM" and message.device == BODY:

@@ -86,14 +86,7 @@ def point_content(positions: np.ndarray, names: Sequence[str], diameters: Sequen
 
 
 def read_transform(message: Message) -> np.ndarray:
-    """Matrix (4, 4) of a TRANSFORM.
-
-    Raises
-    ------
-    MessageError
-        A content of another size, or numbers that are no rigid motion.
-
-    """
+    """Matrix (4, 4) of a TRANSFORM; MessageError for a content of another size, or numbers that are no rigid motion."""
     if len(message.content) != 48:
         raise MessageError(f"a TRANSFORM has 48 bytes, got {len(message.content)}")
     matrix = np.eye(4)
@@ -106,14 +99,7 @@ def read_transform(message: Message) -> np.ndarray:
 
 
 def read_string(message: Message) -> str:
-    """Text of a STRING.
-
-    Raises
-    ------
-    MessageError
-        A length that is not that of the content, or a text that is no UTF-8.
-
-    """
+    """Text of a STRING; MessageError for a length that is not that of the content, or a text that is no UTF-8."""
     content = message.content
     if len(content) < 4:
         raise MessageError("a STRING has an encoding and a length")
@@ -140,11 +126,7 @@ class Reader:
     def push(self, data: bytes) -> list[Message]:
         """Take bytes up, and give the messages that have become complete.
 
-        Raises
-        ------
-        MessageError
-            Bytes that are no message; a body that is too long, or whose checksum differs.
-
+        Raises MessageError for bytes that are no message, a body that is too long, or one whose checksum differs.
         """
         self._bytes += data
         messages = []

@@ -15,16 +15,7 @@ MOST_SENT = 16_384
 
 
 class Peer:
-    """A peer that has connected.
-
-    Parameters
-    ----------
-    connection
-        Its socket, which this object closes.
-    name
-        Its address.
-
-    """
+    """A peer that has connected: its socket, which this object closes, and its address."""
 
     def __init__(self, connection: socket.socket, name: str):
         connection.setblocking(False)
@@ -39,13 +30,7 @@ class Peer:
     def read(self, now: float) -> list[Message]:
         """Messages that have become complete.
 
-        Raises
-        ------
-        MessageError
-            Bytes that are no message.
-        ConnectionError
-            A peer that has gone.
-
+        Raises MessageError for bytes that are no message; ConnectionError for a peer that has gone.
         """
         try:
             data = self.connection.recv(MOST_READ)
@@ -63,11 +48,7 @@ class Peer:
     def send(self, data: bytes, now: float) -> bool:
         """Send data if the peer has taken up all that was sent before; else leave it out: frames are never queued.
 
-        Raises
-        ------
-        OSError
-            A peer that has gone.
-
+        Raises OSError for a peer that has gone.
         """
         if self._unsent:
             return False
@@ -85,14 +66,7 @@ class Peer:
             self._unsent = self._unsent[sent:]
 
     def require_alive(self, now: float) -> None:
-        """Refuse a peer that has stopped within a message, or takes nothing up.
-
-        Raises
-        ------
-        MessageError
-            Of which of them.
-
-        """
+        """Raise MessageError for a peer that has stopped within a message, or takes nothing up."""
         if self._reader.is_within_message and now - self._reading_since > PATIENCE:
             raise MessageError(f"a message was not complete after {PATIENCE:g} s")
         if self._unsent and now - self._sending_since > PATIENCE:

@@ -16,17 +16,9 @@ NEIGHBOURS = 24
 
 
 class SurfaceField:
-    """A field that is known at places.
+    """A field that is known at places about a spacing, m, apart.
 
-    Parameters
-    ----------
-    points, normals
-        (p, 3) m, and (p, 3) unit normals.
-    values
-        (p,), NaN where nothing is known.
-    spacing
-        Of the places, m.
-
+    The ``points`` (p, 3), m, have unit ``normals`` (p, 3). The ``values`` (p,) are NaN where nothing is known.
     """
 
     def __init__(self, points: np.ndarray, normals: np.ndarray, values: np.ndarray, spacing: float):

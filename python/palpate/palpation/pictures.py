@@ -11,6 +11,7 @@ from palpate.figures import empty_figure
 from palpate.mesh import size_text
 from palpate.mesh.triangles import area_vectors, node_normals, units
 from palpate.palpation.records import DetectionRecord, MapRecord, Nodule
+from palpate.palpation.sides import plane_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -152,10 +153,7 @@ def _draw_plane(
     nodules: Sequence[Nodule],
 ) -> None:
     """Draw the side that faces ``up`` as it is seen from there, in mm."""
-    along = np.eye(3)[0 if abs(up[0]) < 0.9 else 1]
-    first = along - (along @ up) * up
-    first /= np.linalg.norm(first)
-    plane = 1e3 * np.array([first, np.cross(up, first)])
+    plane = 1e3 * np.array(plane_axes(up))
     for positions, triangles, at_nodes in meshes:
         facing = triangles[units(area_vectors(positions[triangles])) @ up > 0.5]
         if len(facing) == 0:

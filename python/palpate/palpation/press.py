@@ -33,24 +33,16 @@ STRAIN_LIMIT, FORCE_LIMIT, OTHER_PLACE, NO_CONTACT = "strain limit", "force limi
 
 @dataclass(frozen=True)
 class Measured:
-    """Result of one press; a stiffness that could not be measured is NaN.
+    """Result of one press; a stiffness that could not be measured is NaN."""
 
-    Attributes
-    ----------
-    force, stiffness, secant_stiffness
-        At the depth: N along the normal, N/m, N/m. NaN where something held the tool before.
-    held_by
-        What did: "strain limit" or "force limit"; "other place" where the tool touched beside its point first, "no
-        contact" where it lost the surface; else empty.
-    reached_depth, reached_force
-        m and N, where nothing held it yet.
-
-    """
-
+    # At the depth: N along the normal, N/m, N/m. NaN where something held the tool before.
     force: float
     stiffness: float
     secant_stiffness: float
+    # What did: "strain limit" or "force limit"; "other place" where the tool touched beside its point first, "no
+    # contact" where it lost the surface; else empty.
     held_by: str
+    # m and N, where nothing held it yet.
     reached_depth: float
     reached_force: float
 

@@ -27,36 +27,16 @@ NOT_TOUCHABLE, BY_A_SUPPORT, BY_AN_EDGE = "not touchable", "by a support", "by a
 
 @dataclass(frozen=True)
 class Protocol:
-    """A palpation.
+    """A palpation."""
 
-    Attributes
-    ----------
-    spacing
-        Of the points, m.
-    depth
-        From first touch to the deepest point of a press, m.
-    speed
-        Of a press, m/s, or along a stroke.
-    strokes
-        Whether lines are slid over instead of pressing on points.
-
-    """
-
-    spacing: float
-    depth: float
-    speed: float
-    strokes: bool = False
+    spacing: float  # of the points, m
+    depth: float  # from first touch to the deepest point of a press, m
+    speed: float  # of a press, m/s, or along a stroke
+    strokes: bool = False  # whether lines are slid over instead of pressing on points
 
     @classmethod
     def of(cls, spacing: float | str, depth: float | str, speed: float | str, strokes: bool) -> Protocol:
-        """From numbers in SI, or text with units.
-
-        Raises
-        ------
-        Error
-            A number that is not positive, or no quantity.
-
-        """
+        """Take numbers in SI, or text with units; Error for a number that is not positive, or no quantity."""
         given = {"grid": units.length(spacing), "depth": units.length(depth), "speed": units.speed(speed)}
         for name, value in given.items():
             if not (np.isfinite(value) and value > 0):
@@ -66,11 +46,7 @@ class Protocol:
     def check(self, simulation: Simulation) -> None:
         """Refuse what the first tool of a scene cannot do.
 
-        Raises
-        ------
-        SceneError
-            A depth beyond the tool's own radius, or a speed at which a press has too few ticks.
-
+        Raises SceneError for a depth beyond the tool's own radius, or a speed at which a press has too few ticks.
         """
         tool, rate = simulation.scene.tools[0], simulation.scene.device.rate
         if 0 < tool.reach <= self.depth:
@@ -87,43 +63,21 @@ class Protocol:
 
 @dataclass(frozen=True)
 class Sites:
-    """Where a palpation presses, in the scene.
+    """Where a palpation presses, in the scene."""
 
-    Attributes
-    ----------
-    points, normals
-        (p, 3) m on the surface that tools meet, and outward unit normals (p, 3).
-    bodies
-        (p,) numbers of their bodies.
-    skipped
-        Points left out, by reason.
-
-    """
-
+    # (p, 3) m on the surface that tools meet, and outward unit normals (p, 3).
     points: np.ndarray
     normals: np.ndarray
-    bodies: np.ndarray
-    skipped: dict[str, int] = field(default_factory=dict)
+    bodies: np.ndarray  # (p,) numbers of their bodies
+    skipped: dict[str, int] = field(default_factory=dict)  # points left out, by reason
 
 
 class Selection:
     """Which places of the bodies of a scene are palpated; what is left out is counted.
 
     A place is left out where a node of its triangle may not be touched, and where a support or a sharp edge is closer
-    than the contact is wide, `sqrt(R d)` of a sphere.
-
-    Parameters
-    ----------
-    simulation, protocol
-        Bodies and tool, depth and spacing.
-    on
-        Predicate over places in a body's own frame; None takes all.
-
-    Raises
-    ------
-    SceneError
-        A spacing wider than every body.
-
+    than the contact is wide, `sqrt(R d)` of a sphere. ``on`` is a predicate over places in a body's own frame; None
+    takes all. Raises SceneError for a spacing wider than every body.
     """
 
     def __init__(self, simulation: Simulation, protocol: Protocol, on: str | None):
@@ -169,11 +123,7 @@ class Selection:
 def sample_sites(simulation: Simulation, protocol: Protocol, on: str | None) -> Sites:
     """Points about a spacing apart on all bodies of a scene, where a predicate holds in the body's own frame.
 
-    Raises
-    ------
-    SceneError
-        A spacing wider than every body, one that is far too small, or no point at all.
-
+    Raises SceneError for a spacing wider than every body, one that is far too small, or no point at all.
     """
     selection = Selection(simulation, protocol, on)
     found = []
@@ -194,11 +144,7 @@ def sample_sites(simulation: Simulation, protocol: Protocol, on: str | None) -> 
 def sites_at_points(simulation: Simulation, points: Sequence[Any]) -> Sites:
     """Points that are given, in the scene, m, moved onto the closest surface.
 
-    Raises
-    ------
-    SceneError
-        Something else than points, or one that is far from every body.
-
+    Raises SceneError for something else than points, or one that is far from every body.
     """
     asked = np.array([three_numbers(point, "a point of a palpation", SceneError, units.length) for point in points])
     if len(asked) == 0:

@@ -50,13 +50,8 @@ def run_all(
 ) -> tuple[list[Run], int]:
     """Run each path from a body at rest; also report how many runs were known already.
 
-    A run is the forces on the device (t, 3), N, and whether strain was limited (t,).
-
-    Raises
-    ------
-    SimulationError
-        A fault that latched, with the run that it latched in.
-
+    A run is the forces on the device (t, 3), N, and whether strain was limited (t,). Raises SimulationError for a fault
+    that latched, with the run that it latched in.
     """
     with (
         PartialFile(partial, key_of(simulation, paths)) as partial_runs,

@@ -16,22 +16,13 @@ SHARP, FLAT = np.radians(45.0), np.radians(1.0)
 
 @dataclass(frozen=True)
 class Side:
-    """Part of a surface without sharp edges.
+    """Part of a surface without sharp edges."""
 
-    Attributes
-    ----------
-    positions
-        (s, 3) m, of all nodes of the surface, as the body's own loads have put them.
-    triangles, ranks
-        (t, 3) rows of ``positions``, outward; which triangles of the surface these are (t,).
-    normals, areas
-        (t, 3) outward, and (t,) m^2.
-
-    """
-
-    positions: np.ndarray
+    positions: np.ndarray  # (s, 3) m, of all nodes of the surface, as the body's own loads have put them
+    # (t, 3) rows of ``positions``, outward; which triangles of the surface these are (t,).
     triangles: np.ndarray
     ranks: np.ndarray
+    # (t, 3) outward, and (t,) m^2.
     normals: np.ndarray
     areas: np.ndarray
 
@@ -55,22 +46,28 @@ class Side:
             longest, second = vectors[:, 2], vectors[:, 1]
             # An eigenvector has no sign of its own.
             return tuple(axis * np.sign(axis[np.abs(axis).argmax()]) for axis in (longest, second))
-        up = self.normals[0]
-        along = np.eye(3)[0 if abs(up[0]) < 0.9 else 1]
-        first = along - (along @ up) * up
-        first /= np.linalg.norm(first)
-        return first, np.cross(up, first)
+        return plane_axes(self.normals[0])
+
+
+def plane_axes(up: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Directions (3,) in the plane that faces ``up``: along x, or y where it faces x, and across."""
+    along = np.eye(3)[0 if abs(up[0]) < 0.9 else 1]
+    first = along - (along @ up) * up
+    first /= np.linalg.norm(first)
+    return first, np.cross(up, first)
+
+
+def distances_to_lines(points: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Distances (k, n), m, of points (k, 3) from straight lines between ends (n, 3)."""
+    along = end - start
+    squared = np.maximum((along**2).sum(axis=1), 1e-300)
+    offset = points[:, None] - start
+    share = np.clip((offset * along).sum(axis=2) / squared, 0.0, 1.0)
+    return np.linalg.norm(offset - share[..., None] * along, axis=2)
 
 
 class SurfaceShape:
-    """The surface of a body under its own loads, in its own frame.
-
-    Parameters
-    ----------
-    green
-        The body's Green's function.
-
-    """
+    """The surface of a body under its own loads, in its own frame."""
 
     def __init__(self, green: GreensFunction):
         self.positions = green.surface_positions + green.free_displacements
@@ -145,8 +142,5 @@ class SurfaceShape:
         mask = np.zeros(len(points), dtype=bool)
         for rank, lines in enumerate(near):
             if lines:
-                along, offset = (end - start)[lines], points[rank] - start[lines]
-                squared = np.maximum((along**2).sum(axis=1), 1e-300)
-                share = np.clip((along * offset).sum(axis=1) / squared, 0.0, 1.0)
-                mask[rank] = np.linalg.norm(offset - share[:, None] * along, axis=1).min() < distance
+                mask[rank] = distances_to_lines(points[rank, None], start[lines], end[lines]).min() < distance
         return mask

@@ -15,7 +15,7 @@ from palpate.errors import SceneError
 from palpate.palpation.press import standing_on
 from palpate.palpation.protocol import Protocol, Selection, Sites, closest
 from palpate.palpation.runs import Path3D
-from palpate.palpation.sides import Side
+from palpate.palpation.sides import Side, distances_to_lines
 from palpate.simulation import Simulation
 
 # Step between the passes, of the depth, and how many there are; places a spacing at which a stroke is measured, and the
@@ -30,26 +30,14 @@ SAME_END = 1e-7
 
 @dataclass(frozen=True)
 class Track:
-    """The line of a stroke, tick by tick from its first place on.
+    """The line of a stroke, tick by tick from its first place on."""
 
-    Attributes
-    ----------
-    points, normals
-        (t, 3) m, and outward unit normals (t, 3), in the scene.
-    position
-        (t,) m along the line.
-    ticks
-        (k,) at which its places are reached.
-    lead
-        Ticks before, in which the tool comes down.
-
-    """
-
+    # (t, 3) m, and outward unit normals (t, 3), in the scene.
     points: np.ndarray
     normals: np.ndarray
-    position: np.ndarray
-    ticks: np.ndarray
-    lead: int
+    position: np.ndarray  # (t,) m along the line
+    ticks: np.ndarray  # (k,) at which its places are reached
+    lead: int  # ticks before, in which the tool comes down
 
     @classmethod
     def of(cls, simulation: Simulation, sites: Sites, stroke: np.ndarray, protocol: Protocol) -> Track:
@@ -88,11 +76,7 @@ def slope_of_passes(forces: np.ndarray, protocol: Protocol) -> np.ndarray:
 def strokes_on(simulation: Simulation, protocol: Protocol, on: str | None) -> tuple[Sites, list[np.ndarray]]:
     """Places of strokes over all bodies, and which of them (k,) each stroke visits, in order.
 
-    Raises
-    ------
-    SceneError
-        A spacing wider than every body, no stroke, or a tool that sticks.
-
+    Raises SceneError for a spacing wider than every body, no stroke, or a tool that sticks.
     """
     law = simulation.scene.tools[0].contact
     if law != "local":
@@ -140,7 +124,8 @@ def _lines(side: Side, spacing: float) -> list[tuple[np.ndarray, np.ndarray]]:
         for chain in _chained(segments):
             forward = chain if (chain[-1] - chain[0]) @ first >= 0 else chain[::-1]
             places = _resampled(forward, spacing / PER_SPACING)
-            lines.append((places, side.ranks[faces[_nearest(places, segments)]]))
+            nearest = distances_to_lines(places, segments[:, 0], segments[:, 1]).argmin(axis=1)
+            lines.append((places, side.ranks[faces[nearest]]))
     return lines
 
 
@@ -176,12 +161,3 @@ def _resampled(chain: np.ndarray, step: float) -> np.ndarray:
     count = max(1, round(arc[-1] / step))
     at = (np.arange(count) + 0.5) * arc[-1] / count
     return np.column_stack([np.interp(at, arc, axis) for axis in chain.T])
-
-
-def _nearest(places: np.ndarray, segments: np.ndarray) -> np.ndarray:
-    """Which of the segments (n, 2, 3) is closest to each place (k,)."""
-    start, along = segments[:, 0], segments[:, 1] - segments[:, 0]
-    squared = np.maximum((along**2).sum(axis=1), 1e-300)
-    offset = places[:, None] - start
-    share = np.clip((offset * along).sum(axis=2) / squared, 0.0, 1.0)
-    return np.linalg.norm(offset - share[..., None] * along, axis=2).argmin(axis=1)

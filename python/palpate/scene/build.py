@@ -39,36 +39,19 @@ Progress = bool | Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class BuiltBody:
-    """A body of a scene, ready to be touched.
+    """A body of a scene, ready to be touched."""
 
-    Attributes
-    ----------
-    body
-        None for one from a store, which knows only the surface.
-    green
-        Its Green's function.
-    motion
-        What moves it; None at rest.
-    name
-        What it is called.
-    position, orientation
-        Of its own frame in the scene: m, and a unit quaternion w x y z.
-    series
-        Its displacement beyond small strain by the radius of a sphere, m: as far as it is known, None where nothing is
-        known yet. Empty for a body that stays linear below its contacts.
-    is_growing
-        Whether more of its Green's function is being computed.
-
-    """
-
-    body: Body | None
+    body: Body | None  # None for one from a store, which knows only the surface
     green: GreensFunction
-    motion: BodyMotion | None = None
-    name: str = "body"
+    motion: BodyMotion | None = None  # what moves it; None at rest
+    name: str = "body"  # what it is called
+    # Of its own frame in the scene: m, and a unit quaternion w x y z.
     position: tuple[float, float, float] = (0.0, 0.0, 0.0)
     orientation: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+    # Its displacement beyond small strain by the radius of a sphere, m: as far as it is known, None where nothing is
+    # known yet. Empty for a body that stays linear below its contacts.
     series: tuple[tuple[float, _native.Series | None], ...] = ()
-    is_growing: bool = False
+    is_growing: bool = False  # whether more of its Green's function is being computed
 
     @property
     def is_hyperelastic(self) -> bool:
@@ -131,27 +114,15 @@ def marked_as_growing(built: BuiltScene, growing: Mapping[int, BackgroundPrecomp
 
 
 def mesh_of_body(scene: SceneTables, rank: int = 0) -> TetMesh:
-    """Mesh of a body of a scene, read or made from its surface.
-
-    Raises
-    ------
-    Error
-        A file that cannot be read or filled.
-
-    """
+    """Mesh of a body of a scene, read or made from its surface; Error for a file that cannot be read or filled."""
     return _Builder(scene, rank).mesh()
 
 
 def unsolved_body(scene: SceneTables, rank: int = 0, mesh: TetMesh | None = None) -> Body:
     """Mesh of a body of a scene with its materials, supports and loads, before anything is computed of it.
 
-    ``mesh`` is that of :func:`mesh_of_body`, where it is known.
-
-    Raises
-    ------
-    Error
-        A mesh that cannot be read or made, a region or supports that hold nothing.
-
+    ``mesh`` is that of :func:`mesh_of_body`, where it is known. Raises Error for a mesh that cannot be read or made, a
+    region or supports that hold nothing.
     """
     return _Builder(scene, rank).body(mesh)
 

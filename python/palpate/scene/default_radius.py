@@ -31,12 +31,8 @@ def default_contact_radius(green: GreensFunction) -> float:
 def with_radii(scene: SceneTables, greens: Sequence[GreensFunction]) -> SceneTables:
     """Scene on these bodies whose tools all have their radii.
 
-    Raises
-    ------
-    SceneError
-        A contact radius that covers more nodes than a tick can weigh, a rounding wider than the radius, or a tool
-        larger than the bodies or smaller than a hundredth of an element.
-
+    Raises SceneError for a contact radius that covers more nodes than a tick can weigh, and a rounding wider than the
+    radius. A tool larger than the bodies, or smaller than a hundredth of an element, is refused too.
     """
     for tool in scene.tools:
         _require_size(tool, greens)

@@ -106,13 +106,8 @@ def device_ranks(tools: Sequence[_Tool], tables: Sequence[DeviceTable]) -> list[
     """Rank of the table of each tool's device; None for a device without one.
 
     A tool takes the table that it names, or the first of the kind that it names which no other tool has. A tool that
-    names none takes the table of its own rank, unless that has a name or another tool has it.
-
-    Raises
-    ------
-    Mistake
-        A name that is neither of a table nor of a kind, or a table of two tools.
-
+    names none takes the table of its own rank, unless that has a name or another tool has it. Raises TableError for a
+    name that is neither of a table nor of a kind, or a table of two tools.
     """
     names = [table.name for table in tables]
     taken: dict[int, int] = {}
@@ -151,14 +146,7 @@ def device_ranks(tools: Sequence[_Tool], tables: Sequence[DeviceTable]) -> list[
 
 
 def check_tables(first: DeviceTable, additional: Sequence[DeviceTable]) -> None:
-    """Refuse what belongs to the loop in any but the first table, and a name of two.
-
-    Raises
-    ------
-    Mistake
-        The key, or the name.
-
-    """
+    """Raise TableError for what belongs to the loop in any but the first table, and for a name of two tables."""
     for rank, table in enumerate(additional, 1):
         for key in LOOP_KEYS:
             if key in table.model_fields_set:

@@ -80,11 +80,7 @@ class DynamicsTable(Table):
     def build(self, body: Body, max_stiffness: float, progress: bool | Callable[[int, int], None] = True) -> BodyMotion:
         """Modes and coefficients for a body.
 
-        Raises
-        ------
-        Error
-            A coupling stiffer than the device renders, an unstable scheme, more modes than there are.
-
+        Raises Error for a coupling stiffer than the device renders, an unstable scheme, more modes than there are.
         """
         coupling = max_stiffness if self.coupling is None else self.coupling
         if coupling > max_stiffness:
@@ -112,22 +108,10 @@ class DynamicsTable(Table):
 
 @dataclass(frozen=True)
 class BodyMotion:
-    """Modes and time integration of a body of a scene.
-
-    Attributes
-    ----------
-    basis
-        Its modes.
-    scheme
-        Time step (s), alpha, delta, and the Rayleigh factors of mass (1/s) and stiffness (s).
-    exact
-        Whether each mode takes its exact step instead of Newmark's.
-    coupling
-        Spring between a patch and its tool, N/m.
-
-    """
+    """Modes and time integration of a body of a scene."""
 
     basis: ModalBasis
+    # Time step (s), alpha, delta, and the Rayleigh factors of mass (1/s) and stiffness (s).
     scheme: tuple[float, float, float, float, float]
-    exact: bool
-    coupling: float
+    exact: bool  # whether each mode takes its exact step instead of Newmark's
+    coupling: float  # spring between a patch and its tool, N/m

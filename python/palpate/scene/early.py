@@ -21,22 +21,13 @@ TOWARDS_VIEWER = (0.45, -1.0, 0.62)
 
 @dataclass(frozen=True)
 class Expected:
-    """What computing a body comes to.
+    """What computing a body comes to."""
 
-    Attributes
-    ----------
-    nodes, surface_nodes
-        Of the body.
-    plan
-        None for a body whose store is there.
-    first
-        Centre, m, and radius, m, of the ball that is computed first; None where all of it is soon done.
-
-    """
-
+    # Of the body.
     nodes: int
     surface_nodes: int
-    plan: Plan | None
+    plan: Plan | None  # None for a body whose store is there
+    # Centre, m, and radius, m, of the ball that is computed first; None where all of it is soon done.
     first: tuple[tuple[float, float, float], float] | None = None
 
     @classmethod
@@ -50,11 +41,7 @@ class Expected:
     ) -> Expected:
         """Look for the store of a body, or plan it, with the arguments of :func:`palpate.plan`.
 
-        Raises
-        ------
-        Error
-            A body that cannot be computed, or files without room.
-
+        Raises Error for a body that cannot be computed, or files without room.
         """
         counts = len(body.mesh.nodes), len(body.mesh.surface_nodes)
         if Job.of(body, precision, touch, first, None).stored() is not None:

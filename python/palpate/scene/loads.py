@@ -54,11 +54,7 @@ class LoadTable(Table):
     def check(self, body: Body) -> None:
         """Refuse a load that finds nothing to act on.
 
-        Raises
-        ------
-        BodyError
-            A node that does not exist, or a predicate that holds on no face of the surface.
-
+        Raises BodyError for a node that does not exist, or a predicate that holds on no face of the surface.
         """
         loads = together([self])
         assert loads is not None

@@ -66,6 +66,11 @@ def explain(path: Path, text: str, error: ValidationError, model: type[BaseModel
     return f"{at}: {where}: {_expected(first, keys[-1])}, got {_value_text(first['input'])}"
 
 
+def reason_of(error: ValidationError) -> str:
+    """Why pydantic refuses the first value that it does, without its place."""
+    return error.errors()[0]["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
+
+
 def _expected(mistake: Mapping[str, Any], key: str) -> str:
     """Tell what should have been there, from pydantic's kind of mistake."""
     kind, context = mistake["type"], mistake.get("ctx", {})

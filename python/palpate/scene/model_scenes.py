@@ -23,11 +23,7 @@ DAMPING_RATIOS = (0.03, 0.03)
 def model_scene(name: str, paper: bool = False, motion: bool = False) -> Scene:
     """Scene of a built-in model and two fingers, held so that a finger dents it; with ``motion`` it moves.
 
-    Raises
-    ------
-    SceneError
-        No model of that name.
-
+    Raises SceneError for no model of that name.
     """
     if name not in models.NAMES:
         raise SceneError(f"there is no model '{name}'; there are {', '.join(models.NAMES)}")

@@ -22,14 +22,7 @@ def is_node_file(value: object) -> bool:
 
 
 def read_nodes(path: Path) -> list[int]:
-    """Read the numbers of a file.
-
-    Raises
-    ------
-    SceneError
-        A file that is missing, or that holds anything else.
-
-    """
+    """Read the numbers of a file; SceneError for a file that is missing, or that holds anything else."""
     require_file(path, SceneError)
     numbers: list[int] = []
     for rank, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines()):

@@ -14,11 +14,7 @@ DEPTH = 0.03
 def press_place(built: BuiltScene) -> tuple[np.ndarray, float]:
     """Where the first tool's origin rests when it just touches from above, m, and how deep it presses, m.
 
-    Raises
-    ------
-    SceneError
-        A body whose whole surface is fixed.
-
+    Raises SceneError for a body whose whole surface is fixed.
     """
     body = built.bodies[0]
     green, nodes = body.green, body.points_to_scene(body.green.surface_positions)

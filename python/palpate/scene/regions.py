@@ -124,14 +124,7 @@ class PlaceTable(Table):
             raise ValueError(str(error)) from None
 
     def elements(self, mesh: TetMesh) -> np.ndarray:
-        """Mask of the elements (m,) of this region.
-
-        Raises
-        ------
-        MeshError
-            There are none.
-
-        """
+        """Mask of the elements (m,) of this region; MeshError if there are none."""
         if self.shape is not None:
             return shapes.elements_inside(self.solid(), mesh.nodes, mesh.tets)
         members = mesh.regions == mesh.region_names.get(str(self.mesh_region), self.mesh_region)

@@ -37,13 +37,7 @@ def with_series(
 
     They are read from files beside the stores, or computed, with ``dask`` by the workers of a cluster. Without them
     contacts follow a half-space of the material, and the body below it stays linear. Bodies in motion and bodies with
-    loads have none.
-
-    Raises
-    ------
-    Error
-        A body that is not held.
-
+    loads have none. Raises Error for a body that is not held.
     """
     radii = sphere_radii(built)
     return _with(built, lambda _: radii, lambda job: _computed(job, progress, dask))

@@ -82,11 +82,7 @@ class ShapeTable(Table):
     def shape_arguments(self, folder: Path) -> ShapeArguments:
         """Put the shape as the force loop takes it; a surface file, relative to ``folder``, is read.
 
-        Raises
-        ------
-        MeshError
-            A file that is missing, cannot be read or holds no closed surface.
-
+        Raises MeshError for a file that is missing, cannot be read or holds no closed surface.
         """
         radius = self.radius or 0.0
         if self.shape == "sphere":

@@ -64,11 +64,7 @@ class TouchTable(Table):
     def areas(self, mesh: TetMesh) -> dict[str, SurfaceRegion | None]:
         """Arguments ``touch`` and ``first`` of :func:`palpate.precompute`; ``mesh`` has the regions of the file.
 
-        Raises
-        ------
-        MeshError
-            A region that the file does not have.
-
+        Raises MeshError for a region that the file does not have.
         """
         return {"touch": _area(self.region, mesh), "first": _area(self.first, mesh)}
 

@@ -19,39 +19,22 @@ IN_CAVITY = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Boundaries:
-    """Boundaries of segments.
-
-    Attributes
-    ----------
-    whole
-        Around all voxels of the chosen segments.
-    inner
-        Of each chosen segment but ``rest``, in the order in which they were given: where two overlap, the later counts.
-    rest
-        Rank of the largest segment, which is what the others leave of the whole.
-    volumes
-        Of the voxels of each chosen segment, less those that another counts, m^3.
-    in_cavities
-        Segments that were not chosen and lie in cavities of the whole, with their volumes, m^3.
-
-    """
+    """Boundaries of segments."""
 
     segments: tuple[Segment, ...]
-    whole: Boundary
+    whole: Boundary  # around all voxels of the chosen segments
+    # Of each chosen segment but ``rest``, in the order in which they were given: where two overlap, the later counts.
     inner: dict[int, Boundary]
-    rest: int
-    volumes: list[float]
+    rest: int  # rank of the largest segment, which is what the others leave of the whole
+    volumes: list[float]  # of the voxels of each chosen segment, less those that another counts, m^3
+    # Segments that were not chosen and lie in cavities of the whole, with their volumes, m^3.
     in_cavities: list[tuple[str, float]]
 
 
 def boundaries(labels: LabelMap, wanted: Sequence[str | int]) -> Boundaries:
     """Boundaries of segments by their names.
 
-    Raises
-    ------
-    MeshError
-        A segment that is not there, that has no voxel, or that later ones cover.
-
+    Raises MeshError for a segment that is not there, that has no voxel, or that later ones cover.
     """
     segments = labels.choose(wanted)
     masks = [labels.mask(segment) for segment in segments]

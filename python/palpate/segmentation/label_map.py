@@ -25,26 +25,15 @@ class Segment:
 
 @dataclass(frozen=True, eq=False)
 class LabelMap:
-    """Labels of a file.
+    """Labels of a file."""
 
-    Attributes
-    ----------
-    name
-        Of the file in messages.
-    layers
-        (layers, nx, ny, nz) integers. Segments of different layers may overlap.
-    affine
-        (4, 4): from indices of voxels to positions of their centres, m. The axes are those of the patient: x to the
-        right, y to the front (anterior), z to the head (superior), RAS in short.
-    segments
-        In the order of the file.
-
-    """
-
-    name: str
+    name: str  # of the file in messages
+    # (layers, nx, ny, nz) integers. Segments of different layers may overlap.
     layers: np.ndarray
+    # (4, 4): from indices of voxels to positions of their centres, m. The axes are those of the patient: x to the
+    # right, y to the front (anterior), z to the head (superior), RAS in short.
     affine: np.ndarray
-    segments: tuple[Segment, ...]
+    segments: tuple[Segment, ...]  # in the order of the file
 
     @property
     def spacing(self) -> np.ndarray:
@@ -63,13 +52,8 @@ class LabelMap:
     def find(self, wanted: str | int) -> Segment:
         """Find a segment by its name, or by its label where no name fits.
 
-        Letters may be large or small if only one name fits then.
-
-        Raises
-        ------
-        MeshError
-            There is none, or there are several; the message has the names in the file.
-
+        Letters may be large or small if only one name fits then. Raises MeshError, with the names in the file, if there
+        is none, or if there are several.
         """
         text = str(wanted)
         exact = [s for s in self.segments if s.name == text]
@@ -87,11 +71,7 @@ class LabelMap:
     def choose(self, wanted: Sequence[str | int]) -> tuple[Segment, ...]:
         """Find several segments; without a name the only one of the file.
 
-        Raises
-        ------
-        MeshError
-            A segment that is not there or is given twice, or no name where the file has several.
-
+        Raises MeshError for a segment that is not there or is given twice, or no name where the file has several.
         """
         if not wanted:
             if len(self.segments) == 1:

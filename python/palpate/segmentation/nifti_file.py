@@ -20,11 +20,8 @@ UNITS = {"meter": "m", "mm": "mm", "micron": "um"}
 def read_nifti(path: Path) -> RawImage:
     """Read a label map.
 
-    Raises
-    ------
-    MeshError
-        A file that is damaged or cut short, one without an affine map, or of another number of dimensions.
-
+    Raises MeshError for a file that is damaged or cut short, one without an affine map, or of another number of
+    dimensions.
     """
     import nibabel
 

@@ -42,11 +42,7 @@ class _Decompressor(Protocol):
 def read_nrrd(path: Path) -> RawImage:
     """Read a label map.
 
-    Raises
-    ------
-    MeshError
-        A file that is damaged or cut short, one without a space, or of another number of dimensions.
-
+    Raises MeshError for a file that is damaged or cut short, one without a space, or of another number of dimensions.
     """
     with path.open("rb") as file:
         header = _header(path, file)
@@ -101,11 +97,9 @@ def _sizes(path: Path, header: dict[str, Any]) -> tuple[tuple[int, ...], bool]:
     named = any(re.fullmatch(r"Segment\d+_.+", key) for key in header)
     if len(sizes) == 4 and kinds[:1] == ["list"] and (named or sizes[0] == 1):
         return sizes, True
-    raise MeshError(f"{path}: is an image of {len(sizes)} dimensions ({_by(sizes)}); a label map has 3")
-
-
-def _by(sizes: tuple[int, ...]) -> str:
-    return " x ".join(map(str, sizes))
+    raise MeshError(
+        f"{path}: is an image of {len(sizes)} dimensions ({' x '.join(map(str, sizes))}); a label map has 3"
+    )
 
 
 def _dtype(path: Path, header: dict[str, Any]) -> np.dtype:

@@ -17,35 +17,18 @@ MOST_BYTES = 4 << 30
 
 @dataclass(frozen=True, eq=False)
 class RawImage:
-    """Voxels as they stand in a file.
+    """Voxels as they stand in a file."""
 
-    Attributes
-    ----------
-    layers
-        (layers, nx, ny, nz) numbers of any kind.
-    affine
-        (4, 4) from indices to right, anterior, superior, in the file's unit.
-    unit
-        Unit of length that the file names; None: none.
-    segments
-        Segments that the file names; None: none.
-
-    """
-
-    layers: np.ndarray
-    affine: np.ndarray
-    unit: str | None
-    segments: tuple[Segment, ...] | None
+    layers: np.ndarray  # (layers, nx, ny, nz) numbers of any kind
+    affine: np.ndarray  # (4, 4) from indices to right, anterior, superior, in the file's unit
+    unit: str | None  # unit of length that the file names; None: none
+    segments: tuple[Segment, ...] | None  # segments that the file names; None: none
 
 
 def require_size(path: Path, sizes: Sequence[int], dtype: np.dtype) -> None:
     """Refuse an image that is too large by its header, before anything of it is read.
 
-    Raises
-    ------
-    MeshError
-        More than ``MOST_BYTES``.
-
+    Raises MeshError for more than ``MOST_BYTES``.
     """
     size = dtype.itemsize
     for count in sizes:

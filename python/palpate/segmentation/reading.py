@@ -28,20 +28,8 @@ FLAT = 1e-6
 def load_label_map(path: str | os.PathLike[str], unit: str | None = None) -> LabelMap:
     """Read a segmentation: ``.seg.nrrd``, ``.nrrd``, ``.nii`` or ``.nii.gz``.
 
-    Parameters
-    ----------
-    path
-        The file.
-    unit
-        Unit of length instead of the file's own; without both it is mm.
-
-    Raises
-    ------
-    MeshError
-        A file that is missing, damaged, of another kind, or without a place in the patient.
-    UnitError
-        A unit that is not a length.
-
+    ``unit`` is the unit of length instead of the file's own; without both it is mm. Raises UnitError for a unit that is
+    not a length, and MeshError for a file that is missing, damaged, of another kind, or without a place in the patient.
     """
     path = Path(path)
     require_file(path, MeshError)
@@ -60,14 +48,7 @@ def load_label_map(path: str | os.PathLike[str], unit: str | None = None) -> Lab
 
 
 def _labels(path: Path, raw: RawImage) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Voxels as whole numbers, and the labels in each layer.
-
-    Raises
-    ------
-    MeshError
-        An intensity image.
-
-    """
+    """Voxels as whole numbers, and the labels in each layer; MeshError for an intensity image."""
     voxels = raw.layers
     low, high = voxels.min(), voxels.max()
     why = None

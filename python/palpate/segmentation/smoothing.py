@@ -36,31 +36,19 @@ REACH = 3.0
 
 @dataclass(frozen=True, eq=False)
 class Boundary:
-    """Closed triangles around a mask.
+    """Closed triangles around a mask."""
 
-    Attributes
-    ----------
-    vertices, faces
-        (n, 3) m and (k, 3), outward.
-    field, affine
-        Smoothed distance (nx, ny, nz), positive inside; and (4, 4) from its indices to m.
-    voxel_volume, volume
-        Of the voxels and within the triangles, m^3.
-    width
-        Standard deviation of the Gaussian, m; 0: not smoothed.
-    at_edge
-        Whether the mask reaches the edge of the image, where the boundary is flat.
-
-    """
-
+    # (n, 3) m and (k, 3), outward.
     vertices: np.ndarray
     faces: np.ndarray
+    # Smoothed distance (nx, ny, nz), positive inside; and (4, 4) from its indices to m.
     field: np.ndarray
     affine: np.ndarray
+    # Of the voxels and within the triangles, m^3.
     voxel_volume: float
     volume: float
-    width: float
-    at_edge: bool
+    width: float  # standard deviation of the Gaussian, m; 0: not smoothed
+    at_edge: bool  # whether the mask reaches the edge of the image, where the boundary is flat
 
     def inside(self, points: np.ndarray) -> np.ndarray:
         """Whether points (k, 3), m, lie within, by the field."""

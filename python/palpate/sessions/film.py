@@ -27,11 +27,7 @@ LIGHT, AMBIENT = np.array([0.35, -0.55, 0.76]), 0.6
 def write_mp4(frames: RecordedFrames, path: Path, rate: float, report: Report = None) -> None:
     """Write frames as a film; a first pass finds the largest displacement, for the range of the colours.
 
-    Raises
-    ------
-    Error
-        imageio-ffmpeg is not installed.
-
+    Raises Error if imageio-ffmpeg is not installed.
     """
     try:
         import imageio_ffmpeg
@@ -60,16 +56,7 @@ def write_mp4(frames: RecordedFrames, path: Path, rate: float, report: Report = 
 
 
 class Picture:
-    """A figure of matplotlib that is drawn anew for each frame.
-
-    Parameters
-    ----------
-    frames
-        Of which the pictures are.
-    largest
-        Displacement at the end of the colours, m.
-
-    """
+    """A figure of matplotlib that is drawn anew for each frame; its colours end at the ``largest`` displacement, m."""
 
     def __init__(self, frames: RecordedFrames, largest: float):
         from matplotlib import colormaps

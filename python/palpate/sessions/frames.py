@@ -16,29 +16,17 @@ from palpate.simulation import Frame, Recording, frame_of, simulation_of, ticks_
 
 @dataclass(frozen=True)
 class Span:
-    """What of a recording is shown, and how often.
+    """What of a recording is shown, and how often."""
 
-    Attributes
-    ----------
-    start, end
-        s since the recording began; no end is that of the recording.
-    rate
-        Frames a second.
-
-    """
-
+    # s since the recording began; no end is that of the recording.
     start: float = 0.0
     end: float | None = None
-    rate: float = 30.0
+    rate: float = 30.0  # frames a second
 
     def ticks(self, time: np.ndarray) -> np.ndarray:
         """Rows of ``time`` (t,), s: of each frame the first tick that is not before it.
 
-        Raises
-        ------
-        Error
-            Nothing lies within the span, or a rate that is not positive.
-
+        Raises Error if nothing lies within the span, or for a rate that is not positive.
         """
         if not (np.isfinite(self.rate) and self.rate > 0):
             raise Error(f"the rate of frames must be positive, got {self.rate:g}")
@@ -49,14 +37,7 @@ class Span:
         return np.unique(np.minimum(np.searchsorted(time, wanted - 5e-10), within[-1]))
 
     def within(self, time: np.ndarray) -> np.ndarray:
-        """Rows of ``time`` (t,), s, that lie within the span.
-
-        Raises
-        ------
-        Error
-            There are none.
-
-        """
+        """Rows of ``time`` (t,), s, that lie within the span; Error if there are none."""
         end = np.inf if self.end is None else self.end
         rows = np.flatnonzero((time >= self.start) & (time <= end))
         if len(time) == 0:
@@ -69,25 +50,12 @@ class Span:
 
 @dataclass(frozen=True)
 class RecordedFrame:
-    """A frame, and what the recording says of it.
+    """A frame, and what the recording says of it."""
 
-    Attributes
-    ----------
-    row
-        Of the recording.
-    time
-        Since the recording began, s.
-    frame
-        Bodies, tools and contacts.
-    present
-        (tools,): whether each is in the scene.
-
-    """
-
-    row: int
-    time: float
-    frame: Frame
-    present: np.ndarray
+    row: int  # of the recording
+    time: float  # since the recording began, s
+    frame: Frame  # bodies, tools and contacts
+    present: np.ndarray  # (tools,): whether each is in the scene
 
 
 class RecordedFrames:
@@ -104,8 +72,6 @@ class RecordedFrames:
 
     Attributes
     ----------
-    recording
-        See above.
     simulation
         What it was made with.
     rows

@@ -61,14 +61,7 @@ class Directions:
 
 
 def write_glb(frames: RecordedFrames, path: Path, report: Report = None) -> None:
-    """Write frames as one animation.
-
-    Raises
-    ------
-    Error
-        pygltflib is not installed.
-
-    """
+    """Write frames as one animation; Error if pygltflib is not installed."""
     try:
         import pygltflib  # noqa: F401  asked for before the work
     except ImportError:

@@ -21,14 +21,7 @@ OURS = re.compile(r"(body\d+|tools)_\d{6}\.vtu")
 
 
 def frames_folder(path: Path) -> Path:
-    """Folder of the frames beside a .pvd.
-
-    Raises
-    ------
-    Error
-        There is one, with other files in it.
-
-    """
+    """Folder of the frames beside a .pvd; Error if there is one, with other files in it."""
     folder = path.with_name(f"{path.stem}_frames")
     if folder.exists() and not (folder.is_dir() and all(OURS.fullmatch(file.name) for file in folder.iterdir())):
         raise Error(f"{folder}: exists and contains other files than frames: give another --out, or move it")

@@ -88,11 +88,7 @@ def write_csv(columns: Mapping[str, np.ndarray], path: Path, report: Report = No
 def write_parquet(columns: Mapping[str, np.ndarray], path: Path, about: Mapping[str, str]) -> None:
     """Write columns as Parquet, with what the recording says of itself in the metadata of the schema.
 
-    Raises
-    ------
-    Error
-        pyarrow is not installed.
-
+    Raises Error if pyarrow is not installed.
     """
     try:
         import pyarrow

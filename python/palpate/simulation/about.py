@@ -54,11 +54,7 @@ def recorded_tables(scene: SceneTables) -> dict[str, Any]:
 def require_readable(about: Mapping[str, str], name: str) -> None:
     """Refuse texts that this version cannot read.
 
-    Raises
-    ------
-    SceneError
-        A recording of a later version of Palpate, or one without what every recording has.
-
+    Raises SceneError for a recording of a later version of Palpate, or one without what every recording has.
     """
     try:
         if int(about["format"]) > FORMAT:
@@ -77,14 +73,7 @@ def require_readable(about: Mapping[str, str], name: str) -> None:
 
 
 def scene_of(about: dict[str, str]) -> Scene:
-    """Scene of a recording.
-
-    Raises
-    ------
-    SceneError
-        Tables that this version does not know.
-
-    """
+    """Scene of a recording; SceneError for tables that this version does not know."""
     scene = Scene(**json.loads(about["scene"]))
     scene.start_paths_in(Path(about["folder"]))
     return scene
@@ -93,11 +82,7 @@ def scene_of(about: dict[str, str]) -> Scene:
 def require_same(about: dict[str, str], built: BuiltScene) -> None:
     """Refuse bodies that are not those of the recording.
 
-    Raises
-    ------
-    SceneError
-        The first body that differs, or another number of bodies or tools.
-
+    Raises SceneError with the first body that differs, or for another number of bodies or tools.
     """
     keys, names = json.loads(about["keys"]), json.loads(about["bodies"])
     counts = (len(keys), int(about["tools"]))
@@ -119,11 +104,7 @@ def require_same(about: dict[str, str], built: BuiltScene) -> None:
 def with_recorded_series(about: dict[str, str], built: BuiltScene) -> BuiltScene:
     """Leave out what the recorded loop did not know of the series: it may have begun before all was computed.
 
-    Raises
-    ------
-    SceneError
-        A series that lacks what was known then.
-
+    Raises SceneError for a series that lacks what was known then.
     """
     recorded = json.loads(about.get("series", "[]")) or [[] for _ in built.bodies]
     radii = sphere_radii(built)

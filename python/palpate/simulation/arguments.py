@@ -18,11 +18,7 @@ from palpate.simulation.connecting import largest_stiffness
 def tool_arguments(scene: SceneTables, rank: int) -> tuple[Any, ...]:
     """Shape and numbers of one tool in the order of the native module.
 
-    Raises
-    ------
-    SceneError
-        A surface file that is missing, cannot be read or holds no closed surface, with its line.
-
+    Raises SceneError for a surface file that is missing, cannot be read or holds no closed surface, with its line.
     """
     tool, most = scene.tools[rank], largest_stiffness(scene.device_of(rank))
     try:
@@ -39,13 +35,7 @@ def body_arguments(body: BuiltBody, local: bool) -> tuple[Any, ...]:
     """Arrays of one body in the order of the native module.
 
     Elastic constants at the surface are given wherever they are known, because a tool under the local law may come
-    later.
-
-    Raises
-    ------
-    BodyError
-        A store that does not know them, under a ``local`` law.
-
+    later. Raises BodyError for a store that does not know them, under a ``local`` law.
     """
     motion = body.motion
     moving = None

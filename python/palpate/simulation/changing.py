@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Concatenate, ParamSpec, TypeVar
@@ -17,10 +16,12 @@ from palpate.errors import SceneError, SimulationError
 from palpate.green import GreensFunction, precompute
 from palpate.scene import BuiltBody, BuiltScene, Scene, ToolTable
 from palpate.scene.devices import KINDS, device_change, tables_of_tools
+from palpate.scene.mistakes import reason_of
 from palpate.scene.series import with_series_of_tools, with_stored_series
 from palpate.scene.tables import BodyTable, SceneTables
 from palpate.simulation.arguments import body_arguments, tool_arguments
 from palpate.simulation.connecting import connect_tool, require_devices, warn_if_limited
+from palpate.simulation.series_growth import SeriesGrowth
 from palpate.vectors import three_numbers
 
 Given, Answer = ParamSpec("Given"), TypeVar("Answer")
@@ -39,21 +40,15 @@ def one_at_a_time(
     return exclusive
 
 
-class SceneEditing:
+class SceneEditing(SeriesGrowth):
     """The nodes of a scene, while they are simulated.
 
     Ranks of bodies and tools behind one that is removed go down by one. Contacts between what stays go on, and forces
     of what comes ramp in; a device that goes is left at zero force. A loop that is being recorded cannot be changed.
     """
 
-    scene: SceneTables
-    bodies: tuple[BuiltBody, ...]
-    _core: _native.SimulationCore
-    _armed: bool
-    _running: bool
     # Of the scene that the loop has, as the core counts them; None while another one comes in.
     _number: int | None
-    _editing: threading.RLock
     _given: dict[int, Device]
     _devices: dict[int, str]
 
@@ -159,9 +154,8 @@ class SceneEditing:
         try:
             tool = ToolTable(**{"radius": self.scene.tools[0].radius, **table})
         except ValidationError as error:
-            first = error.errors()[0]
-            place = ".".join(map(str, first["loc"]))
-            raise SceneError(f"tool.{place}: {first['msg'].removeprefix('Value error, ')}") from None
+            place = ".".join(map(str, error.errors()[0]["loc"]))
+            raise SceneError(f"tool.{place}: {reason_of(error)}") from None
         given = None if isinstance(device, str) else device
         rank = len(self.scene.tools)
         require_devices({} if given is None else {rank: given})
@@ -250,18 +244,6 @@ class SceneEditing:
         self._number = number
         self._offer_series()
 
-    def _offer_series(self) -> None:
-        raise NotImplementedError
-
-    def _continue_series(self) -> None:
-        raise NotImplementedError
-
-    def _tool(self, tool: int) -> int:
-        raise NotImplementedError
-
-    def _body(self, body: int) -> int:
-        raise NotImplementedError
-
 
 def _built(body: Body | GreensFunction | Scene | Mapping[str, Any]) -> tuple[BuiltBody, BodyTable]:
     """Build a body, and give the table that describes it."""
@@ -289,8 +271,7 @@ def _placed(
     try:
         BodyTable(model="beam", position=place, orientation=turned)
     except ValidationError as error:
-        first = error.errors()[0]
-        raise SceneError(first["msg"].removeprefix("Value error, ")) from None
+        raise SceneError(reason_of(error)) from None
     return place, turned
 
 

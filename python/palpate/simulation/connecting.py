@@ -19,14 +19,7 @@ UNLIMITED = (INFINITE, INFINITE, INFINITE, INFINITE, INFINITE, None, 0.0, None, 
 
 
 def require_devices(devices: Mapping[int, Device]) -> None:
-    """Refuse what is no device.
-
-    Raises
-    ------
-    DeviceError
-        The tool, and what it was given.
-
-    """
+    """Raise DeviceError for what is no device, with the tool, and what it was given."""
     for tool, device in devices.items():
         if not isinstance(device, Device):
             given = f"the class {device.__name__}" if isinstance(device, type) else type(device).__name__
@@ -60,12 +53,7 @@ def connect(core: _native.SimulationCore, scene: SceneTables, given: Mapping[int
     """Open the device of every tool that is not simulated; what they are called, by tool.
 
     A device that holds less than the scene asks for is warned of: contacts are then rendered as soft as it needs.
-
-    Raises
-    ------
-    DeviceError
-        A device that cannot be opened, and what to do.
-
+    Raises DeviceError for a device that cannot be opened, and what to do.
     """
     names = {}
     try:

@@ -21,6 +21,7 @@ from palpate import _native
 from palpate.atomic import folder_beside
 from palpate.errors import SceneError
 from palpate.green import GreensFunction
+from palpate.input_file import require_replaceable
 from palpate.scene import BuiltBody, BuiltScene, Scene
 from palpate.scene.series import with_whole_series
 from palpate.scene.tables import SceneTables
@@ -49,21 +50,12 @@ def pack(scene: Scene | BuiltScene, path: str | os.PathLike[str], inside: bool =
 
     """
     where = Path(path)
-    _require_replaceable(where)
+    require_replaceable(where, SCENE_FILE, SceneError)
     built = scene if isinstance(scene, BuiltScene) else scene.build()
     with folder_beside(where) as folder:
         description = describe(built, folder, inside)
         text = json.dumps(description, indent=2, allow_nan=False)
         (folder / SCENE_FILE).write_text(text + "\n", encoding="utf-8")
-
-
-def _require_replaceable(path: Path) -> None:
-    if path.is_dir() and any(path.iterdir()) and not (path / SCENE_FILE).is_file():
-        raise SceneError(f"{path}: is a folder of something else: give another name")
-    if path.exists() and not path.is_dir():
-        raise SceneError(f"{path}: is a file: give another name, or delete it first")
-    if not path.absolute().parent.is_dir():
-        raise SceneError(f"{path}: there is no folder {path.parent}; make it first")
 
 
 def describe(

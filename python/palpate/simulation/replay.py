@@ -84,11 +84,7 @@ class Replayed:
 def built_scene_of(recording: Recording, scene: Scene | BuiltScene | None = None) -> BuiltScene:
     """Build the scene of a recording, or one that should give the same.
 
-    Raises
-    ------
-    Error
-        Bodies that cannot be built, or are not those of the recording.
-
+    Raises Error for bodies that cannot be built, or are not those of the recording.
     """
     given = scene_of(dict(recording.about)) if scene is None else scene
     built = with_whole_series(given if isinstance(given, BuiltScene) else given.build(), True)
@@ -99,11 +95,7 @@ def built_scene_of(recording: Recording, scene: Scene | BuiltScene | None = None
 def simulation_of(recording: Recording, scene: Scene | BuiltScene | None = None) -> Simulation:
     """Build the simulation that made a recording, or that of a scene which should give the same.
 
-    Raises
-    ------
-    Error
-        As :func:`built_scene_of` has them.
-
+    Raises the errors of :func:`built_scene_of`.
     """
     simulation = Simulation(built_scene_of(recording, scene))
     simulation._by_surface = measured_by_surface(recording.about)

@@ -35,14 +35,12 @@ class ReplayedSimulation(Simulation):
 
     Attributes
     ----------
-    recorded
-        The recording.
     scene_as_built
         The scene that computes it again.
     ticks
         How many of its ticks can be made again.
-    made
-        How many of them have been, up to the one that is shown.
+    ticks_done
+        How many of them have been made, up to the one that is shown.
     checked
         How many have been compared with what was recorded.
     restarts

@@ -12,6 +12,7 @@ from pydantic import ValidationError
 from palpate import _native
 from palpate.errors import SceneError, SchedulingWarning
 from palpate.scene import BuiltScene, Scene
+from palpate.scene.mistakes import reason_of
 from palpate.scene.tables import DeviceTable
 from palpate.units import brief_repr
 
@@ -20,13 +21,8 @@ def scheduled(scene: Scene | BuiltScene, cpus: Sequence[int] | None, priority: i
     """Build a scene, with processors and priority in place of its own where they are given.
 
     What is given and this machine does not have is refused before anything is computed; what a scene of another machine
-    says only when its loop starts.
-
-    Raises
-    ------
-    SceneError
-        What is no scene, a priority out of range, or processors that this process may not run on.
-
+    says only when its loop starts. Raises SceneError for what is no scene, a priority out of range, or processors that
+    this process may not run on.
     """
     if not isinstance(scene, (Scene, BuiltScene)):
         raise SceneError(f"a simulation takes a palpate.Scene, got {brief_repr(scene)}: Scene.read reads a file")
@@ -42,11 +38,7 @@ def scheduled(scene: Scene | BuiltScene, cpus: Sequence[int] | None, priority: i
 def with_scheduling(device: DeviceTable, cpus: Sequence[int] | None, priority: int | None) -> DeviceTable:
     """Table of a device with other processors and another priority; None keeps its own.
 
-    Raises
-    ------
-    SceneError
-        A priority out of range, or processors that this process may not run on.
-
+    Raises SceneError for a priority out of range, or processors that this process may not run on.
     """
     given = {"cpus": cpus if cpus is None else tuple(cpus), "priority": priority}
     changes = {name: value for name, value in given.items() if value is not None}
@@ -54,8 +46,7 @@ def with_scheduling(device: DeviceTable, cpus: Sequence[int] | None, priority: i
         table = DeviceTable(**{**device.model_dump(exclude_unset=True), **changes}) if changes else device
     except ValidationError as error:
         first = error.errors()[0]
-        reason = first["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
-        raise SceneError(f"device.{first['loc'][0]}: {reason}, got {first['input']}") from None
+        raise SceneError(f"device.{first['loc'][0]}: {reason_of(error)}, got {first['input']}") from None
     if cpus is not None:
         require_cpus(table.cpus)
     return table
@@ -64,11 +55,7 @@ def with_scheduling(device: DeviceTable, cpus: Sequence[int] | None, priority: i
 def start_loop(core: _native.SimulationCore, device: DeviceTable) -> None:
     """Start the loop with the scheduling of a scene, and warn of a priority asked for by name that is not granted.
 
-    Raises
-    ------
-    SceneError
-        Processors that this process may not run on.
-
+    Raises SceneError for processors that this process may not run on.
     """
     require_cpus(device.cpus)
     priority, locked_memory = core.start()
@@ -86,11 +73,7 @@ def start_loop(core: _native.SimulationCore, device: DeviceTable) -> None:
 def require_cpus(cpus: Sequence[int]) -> None:
     """Refuse processors that this process may not run on: the system would leave them out without a word.
 
-    Raises
-    ------
-    SceneError
-        Which they are, and which there are.
-
+    SceneError says which they are, and which there are.
     """
     if not cpus:
         return

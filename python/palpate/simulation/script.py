@@ -19,11 +19,7 @@ UNIT_LENGTH = 1e-6
 def positions_of(positions: Any, tools: int) -> np.ndarray:
     """Positions (t, tools, 3), m, from those of the first tool (t, 3) or of some tools (t, some, 3).
 
-    Raises
-    ------
-    SceneError
-        Another shape, no tick, more tools than the scene has, or infinite positions.
-
+    Raises SceneError for another shape, no tick, more tools than the scene has, or infinite positions.
     """
     path = number_array(positions, "positions")
     if path.ndim not in (2, 3) or path.shape[-1] != 3 or path.size == 0:
@@ -40,11 +36,7 @@ def positions_of(positions: Any, tools: int) -> np.ndarray:
 def orientations_of(orientations: Any, positions: np.ndarray) -> np.ndarray:
     """Check unit quaternions w x y z (t, tools, 4) for positions (t, tools, 3); None does not turn the tools.
 
-    Raises
-    ------
-    SceneError
-        Another shape, or a quaternion of a tool in the scene that is not of length one.
-
+    Raises SceneError for another shape, or a quaternion of a tool in the scene that is not of length one.
     """
     shape = (*positions.shape[:2], 4)
     if orientations is None:
@@ -54,23 +46,20 @@ def orientations_of(orientations: Any, positions: np.ndarray) -> np.ndarray:
     if turned.shape != shape:
         raise SceneError(f"orientations must have shape {shape}, as the positions, got {turned.shape}")
     present = np.isfinite(positions).all(axis=2)
-    length = np.linalg.norm(turned, axis=2)
-    bad = np.argwhere(present & ~(np.abs(length - 1.0) <= UNIT_LENGTH))
-    if len(bad):
-        tick, tool = bad[0]
-        raise SceneError(f"the orientation of tool {tool} at tick {tick} is not a unit quaternion w x y z")
+    require_unit_length(turned, present, "at tick")
     return turned
 
 
+def require_unit_length(orientations: np.ndarray, present: np.ndarray, row: str) -> None:
+    """Refuse quaternions (r, tools, 4) of tools in the scene (r, tools) that are not of length one."""
+    bad = np.argwhere(present & ~(np.abs(np.linalg.norm(orientations, axis=2) - 1.0) <= UNIT_LENGTH))
+    if len(bad):
+        number, tool = bad[0]
+        raise SceneError(f"the orientation of tool {tool} {row} {number} is not a unit quaternion w x y z")
+
+
 def grabs_of(grabs: Any, positions: np.ndarray) -> np.ndarray:
-    """Whether each tool holds on to what it touches (t, tools); None: never.
-
-    Raises
-    ------
-    SceneError
-        Another shape.
-
-    """
+    """Whether each tool holds on to what it touches (t, tools); None: never; SceneError for another shape."""
     shape = positions.shape[:2]
     if grabs is None:
         return np.zeros(shape, dtype=bool)
@@ -99,11 +88,7 @@ def strike_of(
 ) -> tuple[tuple[float, float, float], tuple[float, float, float], float]:
     """Point (m), impulse (N s) and duration (s) of a strike.
 
-    Raises
-    ------
-    SceneError
-        Numbers that are not finite, or a duration below zero.
-
+    Raises SceneError for numbers that are not finite, or a duration below zero.
     """
     seconds = units.time(duration)
     if not (np.isfinite(seconds) and seconds >= 0):
@@ -113,14 +98,7 @@ def strike_of(
 
 
 def number_array(values: Any, what: str) -> np.ndarray:
-    """Take values as an array of numbers.
-
-    Raises
-    ------
-    SceneError
-        Values that are none.
-
-    """
+    """Take values as an array of numbers; SceneError for values that are none."""
     try:
         return np.ascontiguousarray(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):

@@ -12,7 +12,7 @@ from palpate import _native, units
 from palpate.equality import ComparedByValue
 from palpate.errors import SceneError
 from palpate.scene import BuiltScene, Scene
-from palpate.simulation.script import UNIT_LENGTH, number_array
+from palpate.simulation.script import number_array, require_unit_length
 from palpate.simulation.simulation import Simulation
 from palpate.simulation.taxels import taxel_sides
 from palpate.units import brief_repr
@@ -237,11 +237,7 @@ class Sensor:
         if given.shape != shape:
             raise SceneError(f"poses must have shape {shape}, got {given.shape}")
         present = np.isfinite(given[..., :3]).all(axis=2)
-        length = np.sqrt((given[..., 3:] ** 2).sum(axis=2))
-        bad = np.argwhere(present & ~(np.abs(length - 1.0) <= UNIT_LENGTH))
-        if len(bad):
-            copy, tool = bad[0]
-            raise SceneError(f"the orientation of tool {tool} of copy {copy} is not a unit quaternion w x y z")
+        require_unit_length(given[..., 3:], present, "of copy")
         return given
 
 

@@ -12,18 +12,14 @@ from palpate import _native
 from palpate.green.background_series import BackgroundSeries
 from palpate.green.series import SeriesJob
 from palpate.progress import progress_reporter
-from palpate.scene import BuiltBody
 from palpate.scene.series import TITLE, series_jobs
-from palpate.scene.tables import SceneTables
 from palpate.simulation.about import series_text
+from palpate.simulation.adjustable import Adjustable
 
 
-class SeriesGrowth:
+class SeriesGrowth(Adjustable):
     """The series of the bodies of a simulation, where their scene has series."""
 
-    scene: SceneTables
-    bodies: tuple[BuiltBody, ...]
-    _core: _native.SimulationCore
     _running: bool
     _editing: threading.RLock
     _background: BackgroundSeries | None = None
@@ -59,9 +55,6 @@ class SeriesGrowth:
         """Make ready what ticks of a script need: the same script has the same forces."""
         self._arm_strain_limit()
         self.complete_series()
-
-    def _arm_strain_limit(self, limit: float | None = None) -> None:
-        raise NotImplementedError
 
     def _begin_series(self) -> None:
         """Compute what is missing beside the loop, near the tools first."""

@@ -40,11 +40,7 @@ _CHECKS: dict[str, Check] = {
 def checked(name: str, value: Any) -> float:
     """Value of a setting; of one without a range of its own any finite number.
 
-    Raises
-    ------
-    SceneError
-        A value that is no number, or out of its range.
-
+    Raises SceneError for a value that is no number, or out of its range.
     """
     read, holds, refused = _CHECKS.get(name, (_plain(name), lambda x: True, ""))
     checked = read(value)

@@ -27,7 +27,6 @@ from palpate.green import GreensFunction
 from palpate.input_file import require_writable
 from palpate.scene import BodyMotion, BuiltBody, BuiltScene, Scene
 from palpate.simulation.about import about
-from palpate.simulation.adjustable import Adjustable
 from palpate.simulation.arguments import body_arguments, tool_arguments
 from palpate.simulation.changing import SceneEditing
 from palpate.simulation.connecting import assume_tables, connect, disconnect, largest_force, require_devices
@@ -35,7 +34,6 @@ from palpate.simulation.frame import Contact, Frame, contact_of, frame_of
 from palpate.simulation.recording import LOG_DTYPE, Recording, RecordingStatus
 from palpate.simulation.scheduling import scheduled, start_loop
 from palpate.simulation.script import for_all_tools, grabs_of, orientations_of, positions_of, strike_of
-from palpate.simulation.series_growth import SeriesGrowth
 from palpate.simulation.thin import thin_places
 from palpate.simulation.warned import error_text, limit_text, refused_text
 from palpate.vectors import three_numbers
@@ -58,7 +56,7 @@ def _stop_all() -> None:
         simulation.stop()
 
 
-class Simulation(Adjustable, SeriesGrowth, SceneEditing):
+class Simulation(SceneEditing):
     """Force loop of a scene.
 
     As a context manager it runs at 1 kHz on a thread of its own; :meth:`run` needs no clock.

@@ -11,11 +11,7 @@ from palpate.scene.tables import SceneTables, ToolTable
 def taxel_sides(scene: SceneTables, sides: tuple[float, float] | None) -> list[tuple[float, float]]:
     """Width along x and height along y of the grid of each tool, m: those given, or as large as the tool seen along z.
 
-    Raises
-    ------
-    SceneError
-        A tool whose law has no pressures.
-
+    Raises SceneError for a tool whose law has no pressures.
     """
     for rank, tool in enumerate(scene.tools):
         if tool.contact != "local":

@@ -47,22 +47,11 @@ MESH_KEYS = {"model", "paper", "unit", "max_element_size", "element", "refine", 
 
 @dataclass(frozen=True)
 class Answers:
-    """What one body answers.
+    """What one body answers."""
 
-    Attributes
-    ----------
-    rows
-        A row of the table for each press.
-    notes
-        What there was to warn of.
-    problem
-        Why there are no rows; empty if there are.
-
-    """
-
-    rows: list[dict[str, Any]]
-    notes: list[str]
-    problem: str = ""
+    rows: list[dict[str, Any]]  # a row of the table for each press
+    notes: list[str]  # what there was to warn of
+    problem: str = ""  # why there are no rows; empty if there are
 
 
 def files_of(scene: StudyScene) -> dict[str, Path]:

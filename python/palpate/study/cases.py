@@ -27,24 +27,11 @@ Place = tuple[str | int, ...]
 
 @dataclass(frozen=True)
 class Case:
-    """One body of a study.
+    """One body of a study."""
 
-    Attributes
-    ----------
-    number
-        From 1, in the order of the file.
-    name
-        As the file says, or empty.
-    keys
-        What it varies.
-    scene
-        Its tables.
-
-    """
-
-    number: int
-    name: str
-    keys: tuple[Key, ...]
+    number: int  # from 1, in the order of the file
+    name: str  # as the file says, or empty
+    keys: tuple[Key, ...]  # what it varies
     scene: StudyScene
 
     def value(self, key: Key) -> Any:
@@ -62,14 +49,7 @@ class Case:
 
 
 def cases_of(path: Path, text: str, tables: Mapping[str, Any]) -> list[Case]:
-    """Bodies of a study file.
-
-    Raises
-    ------
-    SceneError
-        A mistake in it, with its line.
-
-    """
+    """Bodies of a study file; SceneError for a mistake in it, with its line."""
     base = {name: value for name, value in tables.items() if name not in ("grid", "case")}
     grid, listed = tables.get("grid", {}), tables.get("case", [{}])
     if not isinstance(grid, Mapping) or not isinstance(listed, list):
@@ -164,18 +144,14 @@ def _names(place: Sequence[str | int]) -> list[str]:
     return [str(step) for step in place if not _is_rank(str(step))]
 
 
-def _names_region(scene: StudyScene) -> bool:
-    """Whether a region that may be touched is named."""
-    return "touch" in scene.model_fields_set or scene.bodies[0].touch is not None
-
-
 def _check(scene: StudyScene, path: Path, text: str) -> None:
     """Refuse what a study cannot ask."""
     body = scene.bodies[0]
+    touches = "touch" in scene.model_fields_set or body.touch is not None
     for holds, place, message in (
         (len(scene.bodies) == 1, ["body", 1], "body: a study has one body, which it varies"),
         (body.store is None, ["body", 0, "store"], "body.store: a store cannot be varied; give its mesh or model"),
-        (not _names_region(scene), ["touch"], "touch: the bodies of a study are touched where [[press]] says"),
+        (not touches, ["touch"], "touch: the bodies of a study are touched where [[press]] says"),
         ((body.dynamics or scene.dynamics) is None, ["dynamics"], "dynamics: the bodies of a study are at rest"),
     ):
         if not holds:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -34,7 +35,7 @@ def picture_of_study(columns: Mapping[str, np.ndarray], varied: Sequence[str]) -
     presses = list(dict.fromkeys(columns["press"].tolist()))
     for panel, key in zip(axes, panels, strict=True):
         others = [columns[other] for other in varied if other != key] if key != "case" else []
-        for press, color in zip(presses, _colors(len(presses)), strict=True):
+        for press, color in zip(presses, itertools.cycle(COLORS), strict=False):
             _lines(panel, columns, key, others, values, columns["press"] == press, color, press)
         _scale(panel.set_xscale, columns[key])
         panel.set_xlabel(key)
@@ -68,10 +69,6 @@ def _lines(
         ordered = sorted(rows, key=lambda row: places[row])
         named = label if rank == 0 else None
         panel.plot(places[ordered], values[ordered], "o-", color=color, ms=4, lw=1, alpha=0.8, label=named)
-
-
-def _colors(count: int) -> list[str]:
-    return [COLORS[rank % len(COLORS)] for rank in range(count)]
 
 
 def _scale(choose: object, values: np.ndarray) -> None:

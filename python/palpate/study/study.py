@@ -51,14 +51,7 @@ class Study:
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Study:
-        """Read a study file.
-
-        Raises
-        ------
-        SceneError
-            Missing, not TOML, or a wrong key or value, with its line.
-
-        """
+        """Read a study file; SceneError if it is missing, not TOML, or has a wrong key or value, with its line."""
         path = Path(path)
         text, tables = read_toml(path, SceneError)
         cases = cases_of(path, text, tables)

@@ -42,18 +42,10 @@ WARM = 0.3
 
 @dataclass(frozen=True)
 class Times:
-    """Times, us.
+    """Times, us."""
 
-    Attributes
-    ----------
-    count
-        How many there are.
-    median, p999, worst
-        Half are below, 99.9 % are below, and the largest.
-
-    """
-
-    count: int
+    count: int  # how many there are
+    # Half are below, 99.9 % are below, and the largest.
     median: float
     p999: float
     worst: float
@@ -104,11 +96,7 @@ def tick_times(
 ) -> np.ndarray:
     """Time each tick of a path (t, tools, 3), m, that is run several times offline: (plays, t) us of its thread.
 
-    Raises
-    ------
-    SimulationError
-        A fault that latched within the path.
-
+    Raises SimulationError for a fault that latched within the path.
     """
     orientations = np.broadcast_to(np.array(orientation), (*path.shape[:2], 4)).copy()
     grabs = np.zeros(path.shape[:2], dtype=bool)
@@ -128,23 +116,15 @@ def times_by_kind(times: np.ndarray, kinds: np.ndarray) -> dict[str, Times]:
 
 @dataclass(frozen=True, eq=False)
 class LoopTimes:
-    """A running loop, tick by tick.
+    """A running loop, tick by tick."""
 
-    Attributes
-    ----------
-    compute_us, wakeup_us
-        (ticks,) us.
-    missed_computing, missed_waking
-        Deadlines that passed within ticks that took too long, and before ticks that began too late.
-    priority, locked_memory
-        What the system granted.
-
-    """
-
+    # (ticks,) us.
     compute_us: np.ndarray
     wakeup_us: np.ndarray
+    # Deadlines that passed within ticks that took too long, and before ticks that began too late.
     missed_computing: int
     missed_waking: int
+    # What the system granted.
     priority: bool
     locked_memory: bool
 

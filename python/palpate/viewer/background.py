@@ -55,25 +55,14 @@ class CancellableTask:
         return self._cancelled.is_set()
 
     def require_wanted(self) -> None:
-        """Refuse to go on once it is cancelled.
-
-        Raises
-        ------
-        ViewerError
-            It is.
-
-        """
+        """Raise ViewerError once it is cancelled."""
         if self._cancelled.is_set():
             raise ViewerError("cancelled: the body shown before stays")
 
     async def run(self, work: Callable[[], Result], discard: Callable[[Result], None]) -> Result:
         """Do ``work()`` and return its result; one that comes after cancelling is handed to ``discard``.
 
-        Raises
-        ------
-        ViewerError
-            It was cancelled.
-
+        Raises ViewerError if it was cancelled.
         """
         loop = asyncio.get_running_loop()
         done: asyncio.Future[Result] = loop.create_future()

@@ -72,11 +72,7 @@ class Computing:
     def paint(self, session: Session, message: Mapping[str, Any]) -> None:
         """Let nodes of a message be computed next.
 
-        Raises
-        ------
-        ViewerError
-            Nothing is computed of that body, or nodes that it does not have.
-
+        Raises ViewerError if nothing is computed of that body, or for nodes that it does not have.
         """
         body = index(message, "body", len(session.built.bodies))
         background, surface = self._growing.get(body), session.built.bodies[body].green.surface_nodes
@@ -115,14 +111,7 @@ def mask_text(mask: np.ndarray) -> str:
 
 
 def mask_of(message: Mapping[str, Any], key: str) -> np.ndarray:
-    """Read a mask of a client's message.
-
-    Raises
-    ------
-    ViewerError
-        What is none, or too long.
-
-    """
+    """Read a mask of a client's message; ViewerError for what is none, or too long."""
     text, what = message.get(key), f"{message['type']}: {key} must be a mask in base64"
     if not isinstance(text, str) or len(text) > LONGEST_MASK:
         raise ViewerError(what)

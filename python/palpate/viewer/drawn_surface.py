@@ -23,28 +23,14 @@ APART = 4.0
 
 @dataclass(frozen=True)
 class DrawnSurface:
-    """What is drawn of a surface of s nodes.
+    """What is drawn of a surface of s nodes."""
 
-    Attributes
-    ----------
-    nodes
-        Rows (v,) of the surface nodes that are drawn, ascending.
-    triangles
-        Corners (k, 3) among them.
-    regions
-        Rank of the region behind each triangle (k,).
-    owners
-        The drawn vertex that stands for each surface node (s,); None where all are drawn.
-    deviation
-        How far the surface lies from the drawn triangles at rest, about, m.
-
-    """
-
-    nodes: np.ndarray
-    triangles: np.ndarray
-    regions: np.ndarray
+    nodes: np.ndarray  # rows (v,) of the surface nodes that are drawn, ascending
+    triangles: np.ndarray  # corners (k, 3) among them
+    regions: np.ndarray  # rank of the region behind each triangle (k,)
+    # The drawn vertex that stands for each surface node (s,); None where all are drawn.
     owners: np.ndarray | None = None
-    deviation: float = 0.0
+    deviation: float = 0.0  # how far the surface lies from the drawn triangles at rest, about, m
 
     @property
     def is_whole(self) -> bool:

@@ -83,19 +83,9 @@ class Picture:
 
 
 class Fields:
-    """Fields of one running body; each pose is recovered once for all clients.
+    """Fields of one running body, whose size is in m; each pose is recovered once for all clients.
 
-    Parameters
-    ----------
-    simulation
-        Where displacements come from.
-    size
-        Of the body, m.
-    body
-        Which of the simulation's bodies.
-    surface_map
-        What a palpation has left of it: shown before all else.
-
+    The ``surface_map`` that a palpation has left of it is shown before all else.
     """
 
     def __init__(self, simulation: Simulation, size: float, body: int = 0, surface_map: SurfaceMap | None = None):

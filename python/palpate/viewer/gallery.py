@@ -51,26 +51,14 @@ _CARD = """      <li><a href="{page}?scene={name}">
 
 @dataclass(frozen=True)
 class Card:
-    """What the page shows of a scene.
+    """What the page shows of a scene."""
 
-    Attributes
-    ----------
-    name, title
-        In addresses, and for people.
-    nodes
-        Of its finite elements, or of the surface where those are not known.
-    moves
-        Whether it has a body in motion.
-    size
-        Bytes to fetch.
-
-    """
-
+    # In addresses, and for people.
     name: str
     title: str
-    nodes: int
-    moves: bool
-    size: int
+    nodes: int  # of its finite elements, or of the surface where those are not known
+    moves: bool  # whether it has a body in motion
+    size: int  # bytes to fetch
 
 
 def gallery_page(cards: Sequence[Card], page: str) -> str:

@@ -49,14 +49,7 @@ class Part:
 
 
 def gallery_picture(built: BuiltScene) -> bytes:
-    """Draw a scene while it is pressed, as WebP.
-
-    Raises
-    ------
-    SceneError
-        A body that cannot be pressed.
-
-    """
+    """Draw a scene while it is pressed, as WebP; SceneError for a body that cannot be pressed."""
     from PIL import Image
 
     pixels = _drawn(_parts(built, _pressed(built)))

@@ -24,11 +24,7 @@ def open_viewer(
 ) -> None:
     """Serve until Ctrl-C; the address is printed, and opened where there is a desktop.
 
-    Raises
-    ------
-    Error
-        A port in use, or a scene that cannot be prepared.
-
+    Raises Error for a port in use, or a scene that cannot be prepared.
     """
     asyncio.run(_serve(server, browser, hint, preparation))
 
@@ -38,11 +34,7 @@ def open_replay(
 ) -> None:
     """Show a recording in the page until Ctrl-C, made again by the scene given or its own.
 
-    Raises
-    ------
-    Error
-        A recording that cannot be made again, or a port in use.
-
+    Raises Error for a recording that cannot be made again, or a port in use.
     """
     session = ReplaySession(ReplayedSimulation(recording, scene))
     open_viewer(ViewerServer(session, host=host, port=port), browser=browser, hint=REPLAY)

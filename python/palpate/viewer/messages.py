@@ -52,14 +52,7 @@ def decode(message: bytes) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
 
 
 def parse(text: str | bytes) -> dict[str, Any]:
-    """Read a client's message: a JSON object with a type.
-
-    Raises
-    ------
-    ViewerError
-        Anything else.
-
-    """
+    """Read a client's message: a JSON object with a type; ViewerError for anything else."""
     if isinstance(text, bytes):
         raise ViewerError("a client sends text messages only")
     try:
@@ -86,6 +79,14 @@ def positive_or_none(message: Mapping[str, Any], key: str) -> float | None:
     value = number(message, key)
     if value <= 0.0:
         raise ViewerError(f"{message['type']}: {key} must be a positive number")
+    return value
+
+
+def flag(message: Mapping[str, Any], key: str) -> bool:
+    """Take true or false of a client's message."""
+    value = message.get(key)
+    if not isinstance(value, bool):
+        raise ViewerError(f"{message['type']}: {key} must be true or false")
     return value
 
 

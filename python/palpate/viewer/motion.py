@@ -43,18 +43,7 @@ HISTORY_COLUMNS = 8
 
 
 class MovingBody:
-    """The moving side of a session.
-
-    Parameters
-    ----------
-    simulation
-        The running loop.
-    size
-        Of the body, m.
-    index
-        Which of the scene's bodies moves.
-
-    """
+    """The moving side of a session: one body of its running loop, whose size is in m."""
 
     def __init__(self, simulation: Simulation, size: float, index: int = 0):
         built, scene = simulation.bodies[index], simulation.scene

@@ -35,13 +35,7 @@ def packed_page(built: BuiltScene, name: str) -> bytes:
     """Return the file of a scene, called ``name`` in the page: a header of JSON, then the parts, compressed.
 
     Of each store only the part that contacts and pictures read is taken, with the same numbers: forces are those of the
-    store to the bit.
-
-    Raises
-    ------
-    ViewerError
-        A scene that a device moves.
-
+    store to the bit. Raises ViewerError for a scene that a device moves.
     """
     if any(built.scene.device_of(tool).kind != "simulated" for tool in range(len(built.scene.tools))):
         raise ViewerError("a page without a server has no devices: give its tools the kind 'simulated'")

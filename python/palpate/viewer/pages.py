@@ -23,11 +23,7 @@ TYPES = {
 def load_pages() -> dict[str, tuple[str, bytes]]:
     """Path of each file of the built page, its content type and its bytes; nothing else is ever served.
 
-    Raises
-    ------
-    ViewerError
-        A package built without the page.
-
+    Raises ViewerError for a package built without the page.
     """
     root = resources.files("palpate.viewer") / "static"
     pages: dict[str, tuple[str, bytes]] = {}

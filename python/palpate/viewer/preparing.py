@@ -45,30 +45,18 @@ class PreparingSession(SetupSession):
 
 @dataclass(frozen=True)
 class Preparation:
-    """What prepares a scene.
+    """What prepares a scene."""
 
-    Attributes
-    ----------
-    name
-        Of the scene.
-    build
-        Is called on a thread of its own, with a reporter of stages and a function that draws a surface: its vertices
-        (k, 3), m, and triangles. Returns the scene and what is computed of it later.
-
-    """
-
-    name: str
+    name: str  # of the scene
+    # Is called on a thread of its own, with a reporter of stages and a function that draws a surface: its vertices (k,
+    # 3), m, and triangles. Returns the scene and what is computed of it later.
     build: Callable[[Reporter, Callable[[np.ndarray, np.ndarray], None]], Prepared]
 
 
 async def prepare(server: ViewerServer, preparation: Preparation) -> None:
     """Prepare the scene of a server that shows nothing yet, and let it be touched.
 
-    Raises
-    ------
-    Error
-        A scene that cannot be prepared, or that a page has cancelled. The pages show why.
-
+    Raises Error, which the pages show too, for a scene that cannot be prepared, or that a page has cancelled.
     """
     building, loop = server.begin_building(), asyncio.get_running_loop()
     reporter = server.reporter(preparation.name, building)

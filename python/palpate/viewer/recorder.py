@@ -15,16 +15,7 @@ MOST_IN_A_SECOND = 100
 
 
 class SessionRecorder:
-    """The recording of a running scene.
-
-    Parameters
-    ----------
-    simulation
-        The running loop.
-    folder
-        Where files go.
-
-    """
+    """Recordings of a running loop, as files of a folder."""
 
     def __init__(self, simulation: Simulation, folder: Path):
         self._simulation, self._folder = simulation, folder
@@ -32,11 +23,7 @@ class SessionRecorder:
     def start(self) -> None:
         """Record in a new file, named by scene and time; no file is ever written over.
 
-        Raises
-        ------
-        Error
-            The file cannot be written, or the loop is being recorded already.
-
+        Raises Error if the file cannot be written, or the loop is being recorded already.
         """
         if self._simulation.recording is not None:
             raise ViewerError("record: this session is being recorded already")

@@ -11,7 +11,7 @@ import numpy as np
 
 from palpate.errors import ViewerError
 from palpate.simulation import Frame, ReplayedSimulation
-from palpate.viewer.messages import number, whole
+from palpate.viewer.messages import flag, number, whole
 from palpate.viewer.session import FRAME_AGE, Session
 
 # Recorded seconds shown in a second.
@@ -23,14 +23,7 @@ LONGEST_PAUSE = 0.1
 
 
 class ReplaySession(Session):
-    """A recording that is shown.
-
-    Parameters
-    ----------
-    simulation
-        The recording, made again.
-
-    """
+    """A recording that is made again, and shown."""
 
     controllable = False
     takes_files = False
@@ -54,20 +47,14 @@ class ReplaySession(Session):
     def handle(self, message: Mapping[str, Any]) -> bool:
         """Go to a tick, play or pause, or change the speed. Returns that no settings changed.
 
-        Raises
-        ------
-        Error
-            A message that makes no sense, or one that wants to press or change something.
-
+        Raises Error for a message that makes no sense, or one that wants to press or change something.
         """
         if message["type"] != "replay":
             raise ViewerError("this is a replay: nothing can be pressed or changed")
         known = {"type", "tick", "play", "speed"}
         if not set(message) <= known or len(message) < 2:
             raise ViewerError("replay takes tick, play or speed")
-        play = message.get("play", self._playing)
-        if not isinstance(play, bool):
-            raise ViewerError("replay: play must be true or false")
+        play = flag(message, "play") if "play" in message else self._playing
         speed = number(message, "speed") if "speed" in message else self._speed
         if not SLOWEST <= speed <= FASTEST:
             raise ViewerError(f"replay: the speed goes from {SLOWEST:g} to {FASTEST:g}")
@@ -84,14 +71,7 @@ class ReplaySession(Session):
         self._goal, self._place = tick, float(tick)
 
     def reshaped(self, message: Mapping[str, Any]) -> None:
-        """Refuse: tools have the shapes that they had.
-
-        Raises
-        ------
-        ViewerError
-            Always.
-
-        """
+        """Raise ViewerError: tools have the shapes that they had."""
         raise ViewerError("this is a replay: tools have the shapes that they had")
 
     def _latest(self) -> Frame:

@@ -140,14 +140,7 @@ class ViewerServer(SessionHost):
         return Session(built, maps=self._maps, folder=self._recordings)
 
     async def start(self) -> None:
-        """Listen.
-
-        Raises
-        ------
-        ViewerError
-            The port is in use, or the address is not this machine's.
-
-        """
+        """Listen; ViewerError if the port is in use, or the address is not this machine's."""
         try:
             self._server = await serve(
                 self._client,

@@ -20,7 +20,7 @@ from palpate.scene.tables import ToolTable
 from palpate.simulation import Contact, Frame, Simulation
 from palpate.viewer.fields import ClientView, Fields
 from palpate.viewer.log_rows import RecentRows, downsampled
-from palpate.viewer.messages import encode, index, number, numbered, quaternion, vector, word
+from palpate.viewer.messages import encode, flag, index, number, numbered, quaternion, vector, word
 from palpate.viewer.motion import HISTORY_COLUMNS, MovingBody, history
 from palpate.viewer.recorder import SessionRecorder
 from palpate.viewer.shown_body import ShownBody, title_of
@@ -155,11 +155,7 @@ class Session:
     def handle(self, message: Mapping[str, Any]) -> bool:
         """Do what a controlling client says. Returns whether settings changed.
 
-        Raises
-        ------
-        Error
-            A message that makes no sense, or a value that is refused.
-
+        Raises Error for a message that makes no sense, or a value that is refused.
         """
         handlers: dict[str, Callable[[Mapping[str, Any]], bool]] = {
             "press": self._press,
@@ -176,17 +172,8 @@ class Session:
         return handler(message)
 
     def record(self, message: Mapping[str, Any]) -> dict[str, Any] | None:
-        """Begin a recording, or end it: the message about its end.
-
-        Raises
-        ------
-        Error
-            A recording that cannot be written.
-
-        """
-        if not isinstance(message.get("on"), bool):
-            raise ViewerError("record: on must be true or false")
-        if not message["on"]:
+        """Begin a recording, or end it: the message about its end; Error for a recording that cannot be written."""
+        if not flag(message, "on"):
             return self.recorder.stop()
         self.release()
         self.recorder.start()
@@ -195,11 +182,7 @@ class Session:
     def reshaped(self, message: Mapping[str, Any]) -> BuiltScene | None:
         """Scene with the same bodies, one tool with the shape of a message; None if it has that now.
 
-        Raises
-        ------
-        Error
-            A shape that the tool may not take.
-
+        Raises Error for a shape that the tool may not take.
         """
         tool, name = index(message, "tool", len(self._active)), word(message, "name")
         scene, own = self.built.scene, self.own_tools[tool]
@@ -375,9 +358,7 @@ class Session:
         tool, position = index(message, "tool", len(self._active)), np.array(vector(message, "position"))
         if tool in self.simulation.devices:
             raise ViewerError(f"press: tool {tool} is moved by {self.simulation.devices[tool]}")
-        grab = message.get("grab", False)
-        if not isinstance(grab, bool):
-            raise ViewerError("press: grab must be true or false")
+        grab = "grab" in message and flag(message, "grab")
         if np.abs(position - self._centre).max() > REACH * self.size:
             raise ViewerError("press: the position is far away from the body")
         turned = quaternion(message, "orientation") if "orientation" in message else None

@@ -27,12 +27,6 @@ class SessionHost:
 
     One long work at a time prepares another session. All that touches the session is done on the worker's thread, one
     thing after the other; what is done there asks for the session when its turn comes, not before.
-
-    Parameters
-    ----------
-    session
-        What is shown first.
-
     """
 
     def __init__(self, session: Shown):
@@ -140,14 +134,7 @@ class SessionHost:
     # Long work.
 
     def begin_building(self) -> CancellableTask:
-        """Begin something long: one at a time.
-
-        Raises
-        ------
-        ViewerError
-            Another is not done.
-
-        """
+        """Begin something long; ViewerError while another is not done."""
         self.require_idle()
         self._building = CancellableTask()
         return self._building
@@ -158,14 +145,7 @@ class SessionHost:
         return self._building is not None
 
     def require_idle(self) -> None:
-        """Refuse what would get in the way of a long work.
-
-        Raises
-        ------
-        ViewerError
-            One is under way.
-
-        """
+        """Raise ViewerError for what would get in the way of a long work that is under way."""
         if self.is_building:
             raise ViewerError("wait until what is being prepared is ready, or cancel it")
 

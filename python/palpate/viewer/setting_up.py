@@ -35,16 +35,7 @@ _PLACE = re.compile(r"^\S.*?\.toml(:\d+)?: (\w+: )?")
 
 
 class SettingUp:
-    """The body that is set up, its files, and what pages ask of it.
-
-    Parameters
-    ----------
-    server
-        Whose session this exchanges.
-    folder
-        Where scenes are saved.
-
-    """
+    """The body that is set up, its files, and what pages ask of it; scenes are saved in ``folder``."""
 
     def __init__(self, server: SessionHost, folder: Path):
         self._server, self._folder = server, folder
@@ -69,14 +60,7 @@ class SettingUp:
         return frozenset(self._commands)
 
     async def command(self, message: Mapping[str, Any]) -> None:
-        """Do what the page in control asks for.
-
-        Raises
-        ------
-        Error
-            What makes no sense, or cannot be done now.
-
-        """
+        """Do what the page in control asks for; Error for what makes no sense, or cannot be done now."""
         if not self._server.session.takes_files:
             raise ViewerError("no body can be set up here")
         try:
@@ -142,14 +126,7 @@ class SettingUp:
         self._server.send_control({"type": "uploaded", "bytes": 0})
 
     async def take_part(self, part: bytes) -> None:
-        """Take the next part of a file.
-
-        Raises
-        ------
-        ViewerError
-            A part that was not announced.
-
-        """
+        """Take the next part of a file; ViewerError for a part that was not announced."""
         upload = self._upload
         if upload is None:
             raise ViewerError("upload: announce a file before its parts")

@@ -85,11 +85,7 @@ class SetupBody:
     def change(self, message: Mapping[str, Any]) -> bool:
         """Take choices of a message. Returns whether the body is larger or smaller now.
 
-        Raises
-        ------
-        ViewerError
-            Choices that make no sense for this body.
-
+        Raises ViewerError for choices that make no sense for this body.
         """
         mesh = self._filled()
         changed = self.choices.changed(message, *mesh.bounds)
@@ -105,11 +101,7 @@ class SetupBody:
     def paint(self, first: int, mask: np.ndarray) -> None:
         """Take a part of the painted supports: bits for the surface nodes from ``first`` on.
 
-        Raises
-        ------
-        ViewerError
-            Nodes that the surface does not have.
-
+        Raises ViewerError for nodes that the surface does not have.
         """
         self._filled()
         if first % 8 or first + np.flatnonzero(mask).max(initial=-1) >= len(self._painted):
@@ -161,11 +153,7 @@ class SetupBody:
     def write(self, folder: Path, name: str) -> Path:
         """Write the scene, its tetrahedra and its painted supports into a folder; return the scene file.
 
-        Raises
-        ------
-        ViewerError
-            Choices of which no scene can be made.
-
+        Raises ViewerError for choices that make no scene.
         """
         mesh, choices = self._filled(), self.choices
         if choices.unit is None:
@@ -203,11 +191,7 @@ class SetupBody:
     def scene(self) -> Scene:
         """Scene of what is chosen, from the files that it would be saved in.
 
-        Raises
-        ------
-        Error
-            Choices of which no scene can be made.
-
+        Raises Error for choices that make no scene.
         """
         place = self.folder / "scene"
         shutil.rmtree(place, ignore_errors=True)
@@ -215,14 +199,7 @@ class SetupBody:
         return Scene.read(self.write(place, self.name))
 
     def save(self, folder: Path) -> Path:
-        """Save the scene under a name that no file in the folder has.
-
-        Raises
-        ------
-        Error
-            A folder that cannot be written.
-
-        """
+        """Save the scene under a name that no file in the folder has; Error for a folder that cannot be written."""
         names = [self.name, *(f"{self.name}-{number}" for number in range(2, MOST_SAVED + 1))]
         endings = (".toml", ".vtu", ".nodes")
         free = next((n for n in names if not any((folder / f"{n}{ending}").exists() for ending in endings)), None)

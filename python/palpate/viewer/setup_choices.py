@@ -11,7 +11,7 @@ import numpy as np
 from palpate.body.tissues import TISSUES, Tissue
 from palpate.errors import ViewerError
 from palpate.mesh.size import COMMON_UNITS
-from palpate.viewer.messages import number, vector, whole, word
+from palpate.viewer.messages import flag, number, vector, whole, word
 
 AXES = "xyz"
 # A nodule that is placed first: in the middle, of this part of the body's shortest side, and so many times as stiff.
@@ -55,37 +55,19 @@ class SegmentChoice:
 
 @dataclass(frozen=True)
 class Choices:
-    """What is chosen.
+    """What is chosen."""
 
-    Attributes
-    ----------
-    unit
-        Of the file; None where it may be one of several and nobody has chosen yet.
-    painted
-        Whether the supports are those that are painted, in place of those below a plane.
-    plane, nodule
-        m, Pa; a body without a nodule has None.
-    tissue
-        Name of a material of `TISSUES`.
-    youngs_modulus, poissons_ratio
-        Its values, or others that were chosen later; Pa.
-    radius, friction
-        Of the tool, m.
-    segments
-        Those of a label map within the largest one, which has the material of the body.
-
-    """
-
-    unit: str | None
-    painted: bool
+    unit: str | None  # of the file; None where it may be one of several and nobody has chosen yet
+    painted: bool  # whether the supports are those that are painted, in place of those below a plane
     plane: Plane
-    tissue: str | None
+    tissue: str | None  # name of a material of `TISSUES`
+    # Of the tissue, or others that were chosen later; Pa.
     youngs_modulus: float
     poissons_ratio: float
-    radius: float
+    radius: float  # of the tool, m
     friction: float | None = None
     nodule: Nodule | None = None
-    segments: tuple[SegmentChoice, ...] = ()
+    segments: tuple[SegmentChoice, ...] = ()  # within the largest one, which has the material of the body
 
     def scaled(self, factor: float) -> Choices:
         """Return the same of a body whose lengths are larger by a factor."""
@@ -99,15 +81,11 @@ class Choices:
     def changed(self, message: Mapping[str, Any], low: np.ndarray, high: np.ndarray) -> Choices:
         """Choices with those of a message, for a body between corners (3,), m.
 
-        Raises
-        ------
-        ViewerError
-            A message that makes no sense, or a value that the body cannot take.
-
+        Raises ViewerError for a message that makes no sense, or a value that the body cannot take.
         """
         readers: dict[str, Callable[[], Any]] = {
             "unit": lambda: _one_of(message, "unit", COMMON_UNITS),
-            "painted": lambda: _flag(message, "painted"),
+            "painted": lambda: flag(message, "painted"),
             "plane": lambda: _plane(message, high - low),
             "tissue": lambda: _one_of(message, "tissue", [tissue.name for tissue in TISSUES]),
             "radius": lambda: _radius(message, "radius", high - low),
@@ -158,13 +136,6 @@ def _one_of(message: Mapping[str, Any], key: str, known: Sequence[str]) -> str:
     return name
 
 
-def _flag(message: Mapping[str, Any], key: str) -> bool:
-    value = message.get(key)
-    if not isinstance(value, bool):
-        raise ViewerError(f"setup: {key} must be true or false")
-    return value
-
-
 def _table(message: Mapping[str, Any], key: str) -> dict[str, Any]:
     value = message[key]
     if not isinstance(value, dict):
@@ -186,7 +157,7 @@ def _plane(message: Mapping[str, Any], sides: np.ndarray) -> Plane:
     axis, depth = whole(table, "axis", 0, 2), number(table, "depth")
     if not 0 < depth <= 1.01 * sides[axis]:
         raise ViewerError(f"setup: the plane goes up to {1e3 * sides[axis]:.3g} mm into this body")
-    return Plane(axis, _flag(table, "above"), depth)
+    return Plane(axis, flag(table, "above"), depth)
 
 
 def _nodule(message: Mapping[str, Any], low: np.ndarray, high: np.ndarray) -> Nodule | None:

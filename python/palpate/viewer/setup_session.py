@@ -23,14 +23,7 @@ SAME_POINT = 1e-7
 
 
 class SetupSession:
-    """A body that is set up, or an empty page, in the place of a :class:`palpate.viewer.session.Session`.
-
-    Parameters
-    ----------
-    body
-        None for an empty page.
-
-    """
+    """A body that is set up, or an empty page, in the place of a :class:`palpate.viewer.session.Session`."""
 
     controllable = True
     takes_files = True
@@ -52,14 +45,7 @@ class SetupSession:
         """Nothing is touched."""
 
     def handle(self, message: Mapping[str, Any]) -> bool:
-        """Refuse: nothing can be touched yet.
-
-        Raises
-        ------
-        ViewerError
-            For all but what a page sends when it opens.
-
-        """
+        """Raise ViewerError for all but what a page sends when it opens: nothing can be touched yet."""
         if message["type"] != "release":
             raise ViewerError("nothing can be touched yet: set up a body first")
         return False

@@ -16,25 +16,12 @@ from palpate.viewer.fields import Fields, Picture
 
 @dataclass(frozen=True)
 class ShownBody:
-    """One body of a running scene.
+    """One body of a running scene."""
 
-    Attributes
-    ----------
-    built
-        The body, its Green's function, its place.
-    fields
-        What may be drawn in colours.
-    drawn
-        The surface that the page draws.
-    poissons_ratio
-        None for several materials or a bare store.
-
-    """
-
-    built: BuiltBody
-    fields: Fields
-    drawn: DrawnSurface
-    poissons_ratio: float | None = None
+    built: BuiltBody  # the body, its Green's function, its place
+    fields: Fields  # what may be drawn in colours
+    drawn: DrawnSurface  # the surface that the page draws
+    poissons_ratio: float | None = None  # None for several materials or a bare store
 
     @classmethod
     def of(cls, built: BuiltBody, fields: Fields, poissons_ratio: float | None) -> ShownBody:

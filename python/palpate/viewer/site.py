@@ -14,6 +14,7 @@ from pathlib import Path
 from palpate.atomic import folder_beside
 from palpate.errors import SceneError, ViewerError
 from palpate.green.disk import STORED
+from palpate.input_file import require_replaceable
 from palpate.scene import BuiltScene, Scene
 from palpate.viewer.gallery import PICTURES, Card, gallery_page
 from palpate.viewer.gallery_picture import gallery_picture
@@ -27,22 +28,11 @@ TOUCH_PAGE = "touch.html"
 
 @dataclass(frozen=True)
 class SiteSizes:
-    """Bytes of a site.
+    """Bytes of a site."""
 
-    Attributes
-    ----------
-    program
-        Page and WebAssembly, which all scenes share.
-    scenes
-        Of each scene by its name.
-    pictures
-        Of the gallery with its page; 0 of a site with one scene.
-
-    """
-
-    program: int
-    scenes: dict[str, int]
-    pictures: int
+    program: int  # page and WebAssembly, which all scenes share
+    scenes: dict[str, int]  # of each scene by its name
+    pictures: int  # of the gallery with its page; 0 of a site with one scene
 
     @property
     def total(self) -> int:
@@ -53,20 +43,13 @@ class SiteSizes:
 def write_site(scenes: Sequence[tuple[str, Scene | BuiltScene]], path: Path, gallery: bool | None = None) -> SiteSizes:
     """Write a folder that any web host serves: the page, or with ``gallery`` a page of pictures before it.
 
-    By default several scenes get a gallery.
+    By default several scenes get a gallery. The page opens the first scene, and another one by ``?scene=NAME``. An
+    earlier site of that name is replaced, when the new one is complete.
 
-    The page opens the first scene, and another one by ``?scene=NAME``. An earlier site of that name is replaced, when
-    the new one is complete.
-
-    Raises
-    ------
-    ViewerError
-        A place that is no site, scenes of one name, or a package without page or program.
-    Error
-        As of :meth:`palpate.Scene.build`.
-
+    Raises the errors of :meth:`palpate.Scene.build`, and ViewerError for a place that is no site, scenes of one name,
+    or a package without page or program.
     """
-    _require_replaceable(path)
+    require_replaceable(path, PROGRAM, ViewerError)
     program = find_program()
     names = [plain_name(name) for name, _ in scenes]
     if (twice := next((name for name in names if names.count(name) > 1), None)) is not None:
@@ -94,11 +77,7 @@ def write_site(scenes: Sequence[tuple[str, Scene | BuiltScene]], path: Path, gal
 def with_precision(scene: Scene, precision: str) -> Scene:
     """Scene whose stores have numbers of another precision: ``f16`` is half as large to fetch as ``f32``.
 
-    Raises
-    ------
-    SceneError
-        A precision that does not exist.
-
+    Raises SceneError for a precision that does not exist.
     """
     if precision not in STORED:
         raise SceneError(f"unknown precision '{precision}': use {', '.join(STORED)}")
@@ -112,14 +91,7 @@ def plain_name(name: str) -> str:
 
 
 def static_folder() -> Path:
-    """Folder of the built page.
-
-    Raises
-    ------
-    ViewerError
-        A package built without the page.
-
-    """
+    """Folder of the built page; ViewerError for a package built without the page."""
     static = Path(str(resources.files("palpate.viewer") / "static"))
     if not (static / PAGE).is_file():
         raise ViewerError("the viewer's page is not built: run 'make viewer' (it needs Node)")
@@ -127,14 +99,7 @@ def static_folder() -> Path:
 
 
 def find_program() -> Path:
-    """Path of the WebAssembly.
-
-    Raises
-    ------
-    ViewerError
-        A package built without it.
-
-    """
+    """Path of the WebAssembly; ViewerError for a package built without it."""
     program = Path(str(resources.files("palpate.viewer") / "web" / PROGRAM))
     if not program.is_file():
         raise ViewerError(
@@ -146,15 +111,6 @@ def find_program() -> Path:
 def meta(name: str, content: str) -> str:
     """Element of a page's head that its script reads."""
     return f'<meta name="palpate-{name}" content="{html.escape(content)}" />'
-
-
-def _require_replaceable(path: Path) -> None:
-    if path.is_dir() and any(path.iterdir()) and not (path / PROGRAM).is_file():
-        raise ViewerError(f"{path}: is a folder of something else: give another name")
-    if path.exists() and not path.is_dir():
-        raise ViewerError(f"{path}: is a file: give another name, or delete it first")
-    if not path.absolute().parent.is_dir():
-        raise ViewerError(f"{path}: there is no folder {path.parent}; make it first")
 
 
 def _copy_page(folder: Path, names: Sequence[str], is_gallery: bool) -> None:

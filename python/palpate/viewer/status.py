@@ -37,17 +37,7 @@ class StatusReporter(Reporter):
     """Sends how far a work is, from any thread; it begins with the first call. Made on the thread of the event loop.
 
     The work stops where a page has cancelled it. The time left follows from the pace of a phase; stages of filling take
-    different times, and have none.
-
-    Parameters
-    ----------
-    text
-        What is done.
-    work
-        The work, which a page may cancel.
-    send_all
-        Sends a message to all pages, on the thread of the event loop.
-
+    different times, and have none. ``send_all`` sends a message to all pages, on the thread of the event loop.
     """
 
     def __init__(self, text: str, work: CancellableTask, send_all: Callable[[dict[str, Any]], None]):

@@ -18,29 +18,16 @@ SAME_PLACE = 1e-6
 
 @dataclass(frozen=True)
 class SurfaceMap:
-    """Values at the surface nodes of a body, which a pose does not change.
+    """Values at the surface nodes of a body, which a pose does not change."""
 
-    Attributes
-    ----------
-    stiffness
-        (s,) N/m, NaN where nothing was palpated.
-    change
-        (s,) per cent more than the plain body's; None of a map without it.
-
-    """
-
-    stiffness: np.ndarray
-    change: np.ndarray | None = None
+    stiffness: np.ndarray  # (s,) N/m, NaN where nothing was palpated
+    change: np.ndarray | None = None  # (s,) per cent more than the plain body's; None of a map without it
 
 
 def read_map(path: Path, built: BuiltScene) -> list[SurfaceMap | None]:
     """Read ``stiffness.vtu`` or ``detection.vtu`` for the bodies of a scene; None for one that it does not hold.
 
-    Raises
-    ------
-    ViewerError
-        A file that is missing, cannot be read, is no map, or one of other bodies.
-
+    Raises ViewerError for a file that is missing, cannot be read, is no map, or one of other bodies.
     """
     import meshio
 

@@ -24,21 +24,7 @@ LONGEST_NAME = 120
 
 
 class Upload:
-    """A file on its way.
-
-    Parameters
-    ----------
-    message
-        What the page announces.
-    folder
-        Where the file goes.
-
-    Raises
-    ------
-    ViewerError
-        A file that is too large, or of a kind that is not read.
-
-    """
+    """A file on its way into a folder; ViewerError if it is announced as too large, or of an unknown kind."""
 
     def __init__(self, message: Mapping[str, Any], folder: Path):
         self.file = safe_name(message.get("name"))
@@ -57,14 +43,7 @@ class Upload:
         return self.received == self.size
 
     def take(self, part: bytes) -> None:
-        """Take the next part.
-
-        Raises
-        ------
-        ViewerError
-            More than was announced, or a disk that is full.
-
-        """
+        """Take the next part; ViewerError for more than was announced, or a disk that is full."""
         if self.received + len(part) > self.size or not part:
             self.close()
             raise ViewerError(f"{self.file}: its parts do not come to {self.size} bytes")
@@ -85,11 +64,7 @@ class Upload:
 def safe_name(name: Any) -> str:
     """Name of a file without a folder, and without characters that a file system or a terminal may not take.
 
-    Raises
-    ------
-    ViewerError
-        What is no name.
-
+    Raises ViewerError for what is no name.
     """
     if not isinstance(name, str) or len(name.encode("utf-8", "replace")) > LONGEST_NAME:
         raise ViewerError(f"upload: name must be a text of at most {LONGEST_NAME} bytes")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import palpate
-from palpate.green.series import force_series, series_beside
+from palpate.green.series import SeriesJob, series_beside
 from palpate.scene import BuiltScene, Scene
 from palpate.scene.series import with_series
 from palpate.simulation import Simulation
@@ -109,8 +109,8 @@ def test_the_series_of_a_block_is_that_of_axisymmetric_elements():
     surface = body.mesh.surface_nodes
     near = surface[np.linalg.norm(body.mesh.nodes[surface] - middle, axis=1) < 0.1 * width]
     # The patch of a sphere is 7.5 times as wide as its radius.
-    fields, positions = force_series(green_of(body, touch=near), body, width / 7.5)
-    place = fields[np.linalg.norm(positions - middle, axis=1).argmin()]
+    series = SeriesJob.of(green_of(body, touch=near), body, width / 7.5).compute()
+    place = series.fields[np.linalg.norm(series.positions - middle, axis=1).argmin()]
     cubic, quartic, bending = place[:3], place[3:6], place[8]
     # Pressed along -z, U_3 = -b_z F^3 and q_2 = 3 U_3 / F.
     second = -3.0 * cubic[2]
@@ -128,17 +128,17 @@ def test_the_series_of_a_block_is_that_of_axisymmetric_elements():
 def test_the_series_is_stored_and_linear_bodies_have_none(tmp_path):
     body = cantilever("neo-hookean")
     computed = palpate.precompute(body, precision="f64", progress=False)
-    first = force_series(computed, body, RADIUS)
+    first = SeriesJob.of(computed, body, RADIUS).compute()
     for path in (computed.path, *series_beside(computed.path)):
         shutil.copy(path, tmp_path)
     green = palpate.GreensFunction.load(tmp_path / computed.path.name, body=body)
     (file,) = series_beside(green.path)
     damaged = file.read_bytes()[:-100] + bytes(100)
     file.write_bytes(damaged)
-    for one, other in zip(first, force_series(green, body, RADIUS), strict=True):
-        assert np.array_equal(one, other)
+    again = SeriesJob.of(green, body, RADIUS).compute()
+    assert np.array_equal(first.fields, again.fields) and np.array_equal(first.positions, again.positions)
     assert file.read_bytes() != damaged
-    assert force_series(green, cantilever("linear"), RADIUS) is None
+    assert SeriesJob.of(green, cantilever("linear"), RADIUS) is None
 
 
 @pytest.mark.slow

@@ -32,22 +32,11 @@ FAST_CLOCKS = {
 
 @dataclass(frozen=True)
 class Advice:
-    """Something to change.
+    """Something to change."""
 
-    Attributes
-    ----------
-    key
-        Stable name.
-    finding
-        What is so.
-    remedy
-        Commands or lines of files, one an entry; words that are no command begin with ``#``.
-
-    """
-
-    key: str
-    finding: str
-    remedy: tuple[str, ...]
+    key: str  # stable name
+    finding: str  # what is so
+    remedy: tuple[str, ...]  # commands or lines of files, one an entry; words that are no command begin with ``#``
 
 
 def advice(
@@ -58,15 +47,9 @@ def advice(
 ) -> list[Advice]:
     """Everything that would help, most important first.
 
-    Parameters
-    ----------
-    machine
-        What the system reports.
-    priority, locked_memory
-        What it granted a running loop; None where none has run.
-    taken
-        Shares of the processors' time that all programs took meanwhile, and that the host of a virtual machine took.
-
+    ``priority`` and ``locked_memory`` are what the system granted a running loop; None where none has run. ``taken``
+    are the shares of the processors' time that all programs took meanwhile, and that the host of a virtual machine
+    took.
     """
     if machine.system != "Linux":
         finding = f"on {machine.system} real-time scheduling and locked memory are not set up by the loop"

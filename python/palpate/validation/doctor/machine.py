@@ -27,66 +27,41 @@ CLOCK = "/sys/devices/system/clocksource/clocksource0"
 
 @dataclass(frozen=True)
 class Machine:
-    """A machine, as seen by this process.
+    """A machine, as seen by this process."""
 
-    Attributes
-    ----------
-    system, kernel, processor, user
-        Names.
-    cpus, allowed_cpus
-        Processors that are on, and those that this process may run on.
-    cpu_quota
-        Processors' worth of time that the control group may take; None without a limit.
-    smt
-        Whether processors share cores.
-    isolated_cpus, tickless_cpus
-        Kept free of other programs, and of the kernel's timer tick while one program runs.
-    governors
-        How each policy of frequency is governed, without repetition; empty where the system does not scale.
-    frequency_mhz
-        Lowest and highest frequency.
-    preemption
-        ``PREEMPT_RT``, ``PREEMPT_DYNAMIC``, ``PREEMPT`` or ``none``.
-    timer_hz, high_resolution_timers
-        From the kernel's configuration.
-    clock_source, clock_sources
-        In use, and available.
-    rtprio_limit, memlock_limit
-        Largest real-time priority, and locked memory in bytes, that limits allow; -1 is unlimited.
-    sys_nice, ipc_lock
-        Whether this process may pass by those limits.
-    rt_share
-        Share of the time that real-time threads may take, 1 for all of it.
-    rtkit
-        Whether the service that grants real-time priority to programs of a desktop is installed, and a bus to ask it.
-    hypervisor, container
-        What it runs in: a name, "" for none, or None.
-
-    """
-
+    # Names.
     system: str
     kernel: str
     processor: str | None = None
     user: str | None = None
+    # Processors that are on, and those that this process may run on.
     cpus: int | None = None
     allowed_cpus: tuple[int, ...] | None = None
-    cpu_quota: float | None = None
-    smt: bool | None = None
+    cpu_quota: float | None = None  # processors' worth of time that the control group may take; None without a limit
+    smt: bool | None = None  # whether processors share cores
+    # Kept free of other programs, and of the kernel's timer tick while one program runs.
     isolated_cpus: tuple[int, ...] | None = None
     tickless_cpus: tuple[int, ...] | None = None
+    # How each policy of frequency is governed, without repetition; empty where the system does not scale.
     governors: tuple[str, ...] | None = None
-    frequency_mhz: tuple[float, float] | None = None
-    preemption: str | None = None
+    frequency_mhz: tuple[float, float] | None = None  # lowest and highest frequency
+    preemption: str | None = None  # ``PREEMPT_RT``, ``PREEMPT_DYNAMIC``, ``PREEMPT`` or ``none``
+    # From the kernel's configuration.
     timer_hz: int | None = None
     high_resolution_timers: bool | None = None
+    # In use, and available.
     clock_source: str | None = None
     clock_sources: tuple[str, ...] | None = None
+    # Largest real-time priority, and locked memory in bytes, that limits allow; -1 is unlimited.
     rtprio_limit: int | None = None
     memlock_limit: int | None = None
+    # Whether this process may pass by those limits.
     sys_nice: bool | None = None
     ipc_lock: bool | None = None
-    rt_share: float | None = None
+    rt_share: float | None = None  # share of the time that real-time threads may take, 1 for all of it
+    # Whether the service that grants real-time priority to programs of a desktop is installed, and a bus to ask it.
     rtkit: bool | None = None
+    # What it runs in: a name, "" for none, or None.
     hypervisor: str | None = None
     container: str | None = None
 
@@ -135,22 +110,11 @@ def read_machine(root: Path = Path("/")) -> Machine:
 
 @dataclass(frozen=True)
 class ProcessorTime:
-    """Time of all processors since the start of the system, in ticks of the kernel's accounts.
+    """Time of all processors since the start of the system, in ticks of the kernel's accounts."""
 
-    Attributes
-    ----------
-    total
-        All of it.
-    idle
-        Nothing to do, or waiting for a disk.
-    stolen
-        Given to other guests by the host of a virtual machine.
-
-    """
-
-    total: int
-    idle: int
-    stolen: int
+    total: int  # all of it
+    idle: int  # nothing to do, or waiting for a disk
+    stolen: int  # given to other guests by the host of a virtual machine
 
     def shares_since(self, before: ProcessorTime) -> tuple[float, float]:
         """Shares of the time since then that programs of this system took, and that the host took away."""

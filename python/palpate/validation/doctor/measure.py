@@ -40,18 +40,11 @@ PAGE_SECONDS, PAGE_LIMIT = 4.0, 60.0
 
 @dataclass(frozen=True)
 class PageRate:
-    """Frames of the page.
+    """Frames of the page."""
 
-    Attributes
-    ----------
-    drawn_per_second
-        By a Chromium without a screen, which draws in software; None where there is none, or no Playwright to drive it.
-    served_per_second
-        That a client of the page's protocol got which draws nothing; None where the page was not built.
-
-    """
-
+    # By a Chromium without a screen, which draws in software; None where there is none, or no Playwright to drive it.
     drawn_per_second: float | None
+    # That a client of the page's protocol got which draws nothing; None where the page was not built.
     served_per_second: float | None
 
 

@@ -26,38 +26,18 @@ NOT_AVAILABLE = "not available"
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """All of it.
-
-    Attributes
-    ----------
-    machine
-        What the system reports.
-    seconds
-        How long the loop ran.
-    loop
-        Its times.
-    ticks
-        Times of every kind of tick, played offline, us.
-    page
-        Frames of the page.
-    advice
-        What to change, most important first.
-    taken
-        Shares of the processors' time that programs took while the loop ran, and that the host of a virtual machine
-        took; None where the system does not report.
-    devices
-        Haptic devices, by the drivers that look for them.
-
-    """
+    """All of it."""
 
     machine: Machine
-    seconds: float
+    seconds: float  # how long the loop ran
     loop: LoopTimes
-    ticks: dict[str, Times]
+    ticks: dict[str, Times]  # of every kind of tick, played offline, us
     page: PageRate
-    advice: list[Advice]
+    advice: list[Advice]  # most important first
+    # Shares of the processors' time that programs took while the loop ran, and that the host of a virtual machine took;
+    # None where the system does not report.
     taken: tuple[float, float] | None = None
-    devices: tuple[Listing, ...] = ()
+    devices: tuple[Listing, ...] = ()  # haptic ones, by the drivers that look for them
 
     @property
     def missed(self) -> float:

@@ -9,26 +9,14 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class Check:
-    """One figure beside its target.
+    """One figure beside its target."""
 
-    Attributes
-    ----------
-    quantity
-        What it is, with what it was computed on.
-    computed, target
-        In ``unit``; a target of zero makes the error absolute.
-    source
-        Where the target comes from.
-    tolerance
-        Largest error that passes; None shows the figure without a verdict.
-
-    """
-
-    quantity: str
+    quantity: str  # what it is, with what it was computed on
+    # In ``unit``; a target of zero makes the error absolute.
     computed: float
     target: float
-    source: str
-    tolerance: float | None
+    source: str  # where the target comes from
+    tolerance: float | None  # largest error that passes; None shows the figure without a verdict
     unit: str = ""
 
     @property

@@ -53,18 +53,11 @@ def response(body: Body) -> np.ndarray:
 
 
 def with_moved_supports(body: Body, motion: np.ndarray) -> Body:
-    """Turn a motion of the supports into loads, besides those that the body has.
+    """Turn a motion (n, 3), m, of the supports into loads, besides those that the body has.
 
     With `u_D` at the supports, `K_NN u_N = F_N - K_ND u_D`: the same free displacements follow from fixed supports and
-    the forces `-K_ND u_D`. This needs no columns of `Psi` for the supports.
-
-    Parameters
-    ----------
-    body
-        A supported body.
-    motion
-        (n, 3) m; read at fixed components only.
-
+    the forces `-K_ND u_D`. This needs no columns of `Psi` for the supports. The motion is read at fixed components
+    only.
     """
     moved = np.where(body.fixed_mask, motion, 0.0)
     forces = body.load_vector() - (body.stiffness() @ moved.ravel()).reshape(-1, 3)

@@ -55,14 +55,7 @@ BENCHMARKS = {
 
 
 def chosen(names: Sequence[str]) -> list[Benchmark]:
-    """Benchmarks by name, all for no name.
-
-    Raises
-    ------
-    Error
-        A name that no benchmark has.
-
-    """
+    """Benchmarks by name, all for no name; Error for a name that no benchmark has."""
     for name in names:
         if name not in BENCHMARKS:
             raise Error(f"no benchmark is called '{name}'; there are {', '.join(BENCHMARKS)}")

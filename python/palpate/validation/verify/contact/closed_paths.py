@@ -12,15 +12,9 @@ WAVES, ROTATION = 3, 0.5
 
 @dataclass(frozen=True)
 class ClosedPaths:
-    """Paths that end where they begin, above the surface.
+    """Paths that end where they begin, above the surface."""
 
-    Attributes
-    ----------
-    positions, orientations
-        (paths, ticks, tools, 3) m, and (paths, ticks, tools, 4) unit quaternions w x y z.
-
-    """
-
+    # (paths, ticks, tools, 3) m, and (paths, ticks, tools, 4) unit quaternions w x y z.
     positions: np.ndarray
     orientations: np.ndarray
 

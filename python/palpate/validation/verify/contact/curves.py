@@ -15,20 +15,12 @@ ELSEWHERE = 0.6
 
 @dataclass(frozen=True)
 class Curve:
-    """Places a step apart on a surface.
+    """Places a step apart on a surface."""
 
-    Attributes
-    ----------
-    points, normals
-        (n, 3) m on the flat triangles that the surface is drawn by, and (n, 3) outward, interpolated between the nodes.
-    step
-        m.
-
-    """
-
+    # (n, 3) m on the flat triangles that the surface is drawn by, and (n, 3) outward, interpolated between the nodes.
     points: np.ndarray
     normals: np.ndarray
-    step: float
+    step: float  # m
 
     def part(self, keep: np.ndarray) -> Curve:
         """Longest run of consecutive places of a mask (n,)."""
@@ -38,18 +30,7 @@ class Curve:
 
 
 def section(mesh: TetMesh, origin: np.ndarray, normal: np.ndarray, step: float) -> Curve:
-    """Longest closed curve in which a plane cuts the surface.
-
-    Parameters
-    ----------
-    mesh
-        A body.
-    origin, normal
-        Of the plane, (3,) m and (3,).
-    step
-        m.
-
-    """
+    """Longest closed curve in which a plane cuts the surface of a body, in places a step, m, apart."""
     side = (mesh.nodes - origin) @ normal
     above = side > 0
     ends = np.sort(mesh.surface_triangles[:, [[0, 1], [1, 2], [2, 0]]], axis=2)

@@ -16,7 +16,7 @@ from palpate.green import GreensFunction
 from palpate.mesh import TetMesh
 from palpate.simulation import Simulation
 from palpate.validation.verify.check import Check, Outcome
-from palpate.validation.verify.contact import measures
+from palpate.validation.verify.contact import measures, tools
 from palpate.validation.verify.contact.closed_paths import ClosedPaths
 from palpate.validation.verify.contact.loop import loop_of, sphere, straight
 from palpate.validation.verify.contact.reference import SOFT, graded
@@ -144,11 +144,7 @@ def direct_forces(depths: Sequence[float]) -> list[float]:
     for depth in depths:
         # Going down, the sphere goes into the wall and along it.
         into = depth / np.sqrt(2)
-
-        def gap(places: np.ndarray, along: float = RADIUS - into) -> np.ndarray:
-            inside = RADIUS**2 - (places[:, 0] - along) ** 2 - places[:, 1] ** 2
-            return np.where(inside > 0, RADIUS - np.sqrt(np.maximum(inside, 0.0)), np.inf)
-
+        gap = tools.sphere(RADIUS, (RADIUS - into, 0.0))
         # Four quarters, each with half of the force of a wall.
         found.append(4 * problem.press(gap, [into])[0].force / np.sqrt(2))
     return found

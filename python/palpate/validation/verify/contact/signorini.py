@@ -34,46 +34,23 @@ Gap = Callable[[np.ndarray], np.ndarray]
 
 @dataclass(frozen=True)
 class Press:
-    """A tool at rest in the body.
+    """A tool at rest in the body."""
 
-    Attributes
-    ----------
-    depth, force
-        m, N.
-    area
-        Of all hats that carry pressure, m^2.
-    pressures
-        (n,) Pa, at the nodes.
-
-    """
-
+    # m, N.
     depth: float
     force: float
-    area: float
-    pressures: np.ndarray
+    area: float  # of all hats that carry pressure, m^2
+    pressures: np.ndarray  # (n,) Pa, at the nodes
 
 
 @dataclass(frozen=True)
 class ContactProblem:
-    """Compliance of a part of a body's flat top, for hats of pressure on it.
+    """Compliance of a part of a body's flat top, for hats of pressure on it."""
 
-    Attributes
-    ----------
-    places
-        (n, 2) m, of the nodes.
-    areas
-        (n,) m^2, integrals of the hats.
-    compliance
-        (n, n) `M^T Psi M`, m^3/Pa.
-    quadrature
-        Places (q, 2), hats of the nodes there (q, n) times area.
-
-    """
-
-    places: np.ndarray
-    areas: np.ndarray
-    compliance: np.ndarray
-    quadrature: tuple[np.ndarray, np.ndarray]
+    places: np.ndarray  # (n, 2) m, of the nodes
+    areas: np.ndarray  # (n,) m^2, integrals of the hats
+    compliance: np.ndarray  # (n, n) `M^T Psi M`, m^3/Pa
+    quadrature: tuple[np.ndarray, np.ndarray]  # places (q, 2), hats of the nodes there (q, n) times area
 
     @classmethod
     def on_top(cls, green: GreensFunction, mesh: TetMesh) -> ContactProblem:
