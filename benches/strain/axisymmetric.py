@@ -82,6 +82,19 @@ def graded(fine: float, until: float, growth: float, end: float) -> np.ndarray:
     return np.array(points)
 
 
+def top_height(r: np.ndarray, curvature: float) -> np.ndarray:
+    """Return heights of a curved top, m, at distances r, m, from its middle; a convex one has a positive curvature."""
+    return -0.5 * curvature * r**2 / np.sqrt(1.0 + (curvature * r) ** 2)
+
+
+def with_curved_top(nodes: np.ndarray, r: np.ndarray, curvature: float) -> np.ndarray:
+    """Move nodes (n, k), m, whose last coordinate is the height and is 0 at the top; the lower end stays flat."""
+    moved = nodes.copy()
+    z = nodes[:, -1]
+    moved[:, -1] += top_height(r, curvature) * (1.0 - z / z.min())
+    return moved
+
+
 @dataclass
 class Cylinder:
     """A cylinder of 9-node elements, bonded or lying on a smooth table at its lower end.
@@ -96,6 +109,8 @@ class Cylinder:
         Whether the lower end is bonded; otherwise it may slide.
     clamped_rim
         Whether the outer side is held.
+    curvature
+        Of the top at its middle, 1/m.
     """
 
     r: np.ndarray
@@ -104,6 +119,7 @@ class Cylinder:
     bonded: bool = True
     clamped_rim: bool = False
     free_below: bool = False
+    curvature: float = 0.0
     u: np.ndarray = field(init=False)
     step: np.ndarray = field(init=False)
     depth: float = field(init=False)
@@ -114,7 +130,8 @@ class Cylinder:
         middles = [np.sort(np.concatenate([c, 0.5 * (c[1:] + c[:-1])])) for c in (self.r, np.sort(self.z))]
         rows = np.stack(np.meshgrid(*middles, indexing="ij"), -1)
         self.shape = rows.shape[:2]
-        self.nodes = rows.reshape(-1, 2)
+        flat = rows.reshape(-1, 2)
+        self.nodes = with_curved_top(flat, flat[:, 0], self.curvature)
         self.u, self.step, self.depth = np.zeros_like(self.nodes), np.zeros_like(self.nodes), 0.0
         number = np.arange(len(self.nodes)).reshape(self.shape)
         n, m = len(self.r) - 1, len(self.z) - 1
@@ -134,8 +151,9 @@ class Cylinder:
         by_x = np.einsum("qi,pj->qpij", slope, value).reshape(9, 9)
         by_y = np.einsum("qi,pj->qpij", value, slope).reshape(9, 9)
         at = self.nodes[self.elements]
-        size = at[:, 8] - at[:, 0]
-        n_r, n_z = by_x * 2.0 / size[:, 0, None, None], by_y * 2.0 / size[:, 1, None, None]
+        jacobian = np.einsum("xqi,eic->eqxc", np.stack([by_x, by_y]), at)
+        by_place = np.einsum("eqcx,xqi->ceqi", np.linalg.inv(jacobian), np.stack([by_x, by_y]))
+        n_r, n_z = by_place
         radius = np.einsum("qi,ei->eq", shape, at[:, :, 0])
         count = len(self.elements)
         b = np.zeros((count, 9, 5, 9, 2))
@@ -143,18 +161,19 @@ class Cylinder:
         b[:, :, 2, :, 1], b[:, :, 3, :, 1] = n_r, n_z
         b[:, :, 4, :, 0] = shape / radius[:, :, None]
         self._b = b.reshape(count, 9, 5, 18)
-        area = np.outer(weights, weights).ravel() * (size.prod(1) / 4.0)[:, None]
+        area = np.outer(weights, weights).ravel() * np.linalg.det(jacobian)
         self._weight = 2.0 * np.pi * radius * area
 
     def _top(self, number: np.ndarray) -> None:
         points, weights = np.polynomial.legendre.leggauss(6)
-        value, _ = _quadratic(points)
+        value, slope = _quadratic(points)
         top = number[:, -1]
         edges = np.stack([top[0:-2:2], top[1:-1:2], top[2::2]], 1)
-        at = self.nodes[edges][:, :, 0]
-        radius = at @ value.T
+        at = self.nodes[edges]
+        radius = at[:, :, 0] @ value.T
+        length = np.linalg.norm(np.einsum("eic,qi->eqc", at, slope), axis=2)
         self._edges, self._edge_shape = edges, value
-        self._edge_weight = 2.0 * np.pi * radius * weights * 0.5 * (at[:, 2] - at[:, 0])[:, None]
+        self._edge_weight = 2.0 * np.pi * radius * weights * length
         self.pressures = np.zeros_like(radius)
 
     def _supports(self, number: np.ndarray) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import palpate
+from benches.strain.axisymmetric import top_height, with_curved_top
 from palpate.scene import BuiltScene, Scene
 from palpate.scene.series import with_series
 from palpate.simulation import Simulation
@@ -44,6 +45,8 @@ class Cylinder:
     law: str
     depths: list[float]
     forces: list[float]
+    # Curvature of the top at its middle, 1/m.
+    curvature: float = 0.0
     # Edges of elements below the sphere, m; None: equal elements of EDGE.
     cell: float | None = None
 
@@ -55,8 +58,10 @@ class Cylinder:
         return palpate.Material(poissons_ratio=self.nu, law=self.law, **given, **constants)
 
     def mesh(self) -> palpate.TetMesh:
-        """Return 10-node elements that follow the circle at the rim."""
-        return self.corner_mesh().to_quadratic()
+        """Return 10-node elements that follow the circle at the rim and the top."""
+        mesh = self.corner_mesh().to_quadratic()
+        r = np.hypot(*mesh.nodes.T[:2])
+        return palpate.TetMesh(with_curved_top(mesh.nodes, r, self.curvature), mesh.tets)
 
     def corner_mesh(self) -> palpate.TetMesh:
         """Return the same as 4-node elements."""
@@ -110,7 +115,8 @@ class Cylinder:
         """Scene with one tool; only the middle of the top may be touched."""
         body = self.body(linear)
         places = body.mesh.nodes[body.mesh.surface_nodes]
-        near = (places[:, 2] > -1e-9) & (np.hypot(places[:, 0], places[:, 1]) < TOUCHED)
+        r = np.hypot(places[:, 0], places[:, 1])
+        near = (places[:, 2] > top_height(r, self.curvature) - 1e-9) & (r < TOUCHED)
         green = palpate.precompute(
             body, touch=body.mesh.surface_nodes[near], path=folder / f"{self.name}.palpate", progress=False
         )

@@ -1,4 +1,4 @@
-"""Forces of a sphere of 10 mm on cylinders at finite strain: blocks, layers, columns, plates, random bodies.
+"""Forces of a sphere of 10 mm on cylinders at finite strain: blocks, layers, columns, domes, plates, random bodies.
 
 They are what tests and docs/accuracy.md compare the force loop with; `tests/data/large_strain.json` has them.
 """
@@ -50,6 +50,10 @@ def cases() -> list[dict]:
         found.append(_case(f"column {nu}", (0.025, 0.05), nu, "bonded", [0.005, 0.01, 0.015]))
     for t in (0.01, 0.015):
         found.append(_case(f"layer {t}", (0.06, t), 0.45, "bonded", np.array([0.1, 0.2, 0.3, 0.4]) * t))
+    for nu in (0.3, 0.45):
+        for name, curvature in (("dome", 1 / 0.04), ("hollow", -1 / 0.06)):
+            depths = [0.0025, 0.005, 0.01, 0.015]
+            found.append(_case(f"{name} {nu}", (0.05, 0.05), nu, "bonded", depths) | {"curvature": curvature})
     found.append(_case("plate", (0.05, 0.01), 0.45, "rim", [0.0025, 0.005, 0.01, 0.015]))
     for first, seed in enumerate(SEEDS):
         rng = np.random.default_rng(seed)
@@ -92,7 +96,8 @@ def _solved_with(case: dict, fine: float) -> dict:
     r = graded(fine, min(1.4 * RADIUS, 0.7 * radius), GROWTH, radius)
     z = graded(fine, min(0.9 * RADIUS, 0.5 * height), GROWTH, height)
     rim = support == "rim"
-    body = Cylinder(r, -z, material(case["law"], case["nu"]), support != "table", rim, rim)
+    curvature = case.get("curvature", 0.0)
+    body = Cylinder(r, -z, material(case["law"], case["nu"]), support != "table", rim, rim, curvature)
     depths = np.array(case["depths"])
     between = np.arange(0.1, depths.max() / RADIUS, STEP) * RADIUS
     between = between[np.abs(between[:, None] - depths).min(1) > 0.03 * RADIUS]

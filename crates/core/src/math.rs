@@ -4,4 +4,4 @@
 //! own. A tick, and what it is prepared from, calls these instead: the same input gives the same bits in a program and in a
 //! browser.
 
-pub(crate) use libm::{acos, asin, atan2, cbrt, cos, exp, expm1, hypot, log, log2, pow, sin, sincos, tan, tanh};
+pub(crate) use libm::{acos, asin, atan2, atanh, cbrt, cos, exp, expm1, hypot, log, log2, pow, sin, sincos, tan, tanh};

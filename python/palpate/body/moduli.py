@@ -9,9 +9,13 @@ from palpate.body.material import strain_term_rows
 
 
 def surface_moduli(body: Body) -> tuple[np.ndarray, np.ndarray]:
-    """Young's modulus (s,), Pa, and Poisson's ratio (s,) at the surface nodes: the means of the elements around."""
-    young, poisson = _at_surface_nodes(body, body.element_materials[:, :2]).T
-    return np.ascontiguousarray(young), np.ascontiguousarray(poisson)
+    """Young's modulus (s,), Pa, and Poisson's ratio (s,) at the surface nodes.
+
+    Of the modulus it is the harmonic mean of the elements around: beside a stiffer part the softer one yields.
+    """
+    young, poisson = body.element_materials[:, :2].T
+    inverse, ratio = _at_surface_nodes(body, np.stack([1.0 / young, poisson], axis=1)).T
+    return 1.0 / inverse, np.ascontiguousarray(ratio)
 
 
 def surface_strain_terms(body: Body) -> np.ndarray:

@@ -19,7 +19,7 @@ NODE, RADIUS, TICK, DEPTHS = 463, 10e-3, 20e-6, np.array([1e-3, 2e-3, 5e-3])
 REACHES = ((0.025,), (0.025, 0.015), (0.03, 0.02, 0.012))
 # Surface that may be touched, over the radius.
 AROUND = 3.6
-TOLERANCE = 0.045
+TOLERANCE = 0.05
 
 
 def forces(mesh: palpate.TetMesh, place: np.ndarray, normal: np.ndarray) -> np.ndarray:

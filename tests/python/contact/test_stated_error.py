@@ -57,6 +57,17 @@ def test_a_plate_that_hardens_is_followed_to_one_and_a_half_thicknesses(tmp_path
     assert stated.max() < 0.16
 
 
+@pytest.mark.parametrize("name", ["dome 0.45", "hollow 0.45", "dome 0.3", "hollow 0.3"])
+def test_a_curved_surface_has_the_force_of_a_full_solution(name, tmp_path):
+    """A sphere of the effective radius would be 7 to 11 % off one radius deep."""
+    (body,) = (body for body in references(0.006) if body.name == name)
+    forces, stated = body.pressed(tmp_path)
+    errors = np.abs(forces / body.forces - 1.0)
+    # To a radius.
+    assert errors[:3].max() < 0.03
+    assert (errors < stated).all()
+
+
 @pytest.mark.parametrize("thickness", ["0.01", "0.015"])
 def test_a_glued_layer_has_the_force_of_a_full_solution(thickness, tmp_path):
     """With the compliance of a patch as wide as the layer is thick it would be 9 to 12 % off on the thinner one."""

@@ -21,6 +21,8 @@ use crate::{Error, Result};
 
 /// Most nodes a patch of the servo may have: its 3x3 compliance costs the square of it, once a contact.
 pub const MAX_PATCH_NODES: usize = 256;
+/// Cosine of the angle between normals from which a patch goes on: none goes round a right angle, whatever the rounding.
+const FACING: f64 = 1e-6;
 
 /// The nodes under a contact and their weights.
 #[derive(Clone, Debug)]
@@ -315,7 +317,7 @@ impl<'a, F: Face<N>, const N: usize> Walk<'a, F, N> {
             for (k, &other) in self.surface.neighbours[t as usize].iter().enumerate() {
                 if other != u32::MAX
                     && scratch.visited[other as usize] != scratch.visit
-                    && self.surface.normals[other as usize].dot(self.facing) > 0.0
+                    && self.surface.normals[other as usize].dot(self.facing) > FACING
                     && self.reaches([ends[k], ends[(k + 1) % 3]], bulges[k])
                 {
                     scratch.visited[other as usize] = scratch.visit;

@@ -125,7 +125,7 @@ impl Moduli {
     }
 }
 
-/// Fields at a fan: mean and Gaussian curvature (1/m, 1/m^2), `E/(1 - nu^2)` (Pa) and `nu`, `C_reg` by
+/// Fields at a fan: mean and Gaussian curvature (1/m, 1/m^2), `(1 - nu^2)/E` (1/Pa) and `nu`, `C_reg` by
 /// `xx, xy, xz, yy, yz, zz` (m/N; zero where the body is not touchable), `b` (m), how its normal part changes with the square
 /// of the contact radius (1/(N m)), and the coefficients of finite strain.
 pub type FanFields = [f64; FIELDS];
@@ -135,8 +135,9 @@ pub const FIELDS: usize = 15;
 pub const MEAN: usize = 0;
 /// Field of the Gaussian curvature.
 pub const GAUSS: usize = 1;
-/// Field of `E/(1 - nu^2)`.
-pub const PLANE_STRAIN: usize = 2;
+/// Field of `(1 - nu^2)/E`. It is blended rather than the modulus, as the half-spaces that are taken off `C_reg` are: what a tool
+/// feels is the blend of the body's compliances beside a stiffer part too.
+pub const INVERSE_MODULUS: usize = 2;
 /// Field of Poisson's ratio.
 pub const POISSON: usize = 3;
 /// Fields of `C_reg`.
@@ -208,9 +209,10 @@ impl RegularCompliance {
         };
         let fields = fan_compliances.into_iter().zip(body.smooth.fans()).map(|(at, fan)| {
             let FanCompliance { regular: c, width, widening } = at;
-            let (modulus, poisson) = (body.moduli.plane_strain(fan.node), body.moduli.poissons[fan.node as usize]);
+            let (inverse, poisson) =
+                (1.0 / body.moduli.plane_strain(fan.node), body.moduli.poissons[fan.node as usize]);
             let [x, y, z] = [c.x_axis, c.y_axis, c.z_axis];
-            let body_fields = [fan.mean, fan.gauss, modulus, poisson, x.x, x.y, x.z, y.y, y.z, z.z, width, widening];
+            let body_fields = [fan.mean, fan.gauss, inverse, poisson, x.x, x.y, x.z, y.y, y.z, z.z, width, widening];
             let mut fields = [0.0; FIELDS];
             fields[..WIDENING + 1].copy_from_slice(&body_fields);
             fields[STRAIN_TERMS].copy_from_slice(&body.moduli.strain_terms[fan.node as usize]);

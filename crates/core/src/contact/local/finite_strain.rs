@@ -8,7 +8,8 @@
 //! dU = int dF dd = 4/3 E* R^3 s^5 (q_1 s/3 + q_2 s^2/3.5 + q_3 s^3/4)
 //! ```
 //!
-//! and continued by its tangent beyond the depths that were computed. A linear material has `q = 0`. Added to Sneddon's law it keeps
+//! and continued by its tangent beyond the depths that were computed. On a curved surface it is the same: with the effective radius
+//! in place of `R` forces on domes and hollows of four to six radii are farther from full solutions (docs/accuracy.md). A linear material has `q = 0`. Added to Sneddon's law it keeps
 //! one energy, and its coefficients blend over a surface of several materials.
 //!
 //! A pad on the tool takes a share of the approach. With `E*` of both and `w = E*/E_body*` the body's own depth over its effective
@@ -32,13 +33,11 @@ pub struct StrainCorrection {
     pub stiffness: f64,
     /// J.
     pub energy: f64,
-    /// Derivative of the energy by the sphere's radius at constant approach, J/m.
-    pub energy_by_radius: f64,
     /// The same by each coefficient, J.
     pub energy_by_terms: StrainTerms,
 }
 
-/// The correction for a sphere of effective `radius`, m, that approaches a half-space of modulus `E*`, Pa, by `approach`, m.
+/// The correction for a sphere of `radius`, m, that approaches a body of modulus `E*`, Pa, by `approach`, m.
 pub fn correct_sphere(approach: f64, radius: f64, effective_modulus: f64, terms: &StrainTerms) -> StrainCorrection {
     if approach.is_nan() || approach <= 0.0 {
         return StrainCorrection::default();
@@ -65,8 +64,6 @@ pub fn correct_sphere(approach: f64, radius: f64, effective_modulus: f64, terms:
         force: scale * radius * force,
         stiffness: scale * slope,
         energy: joules * energy,
-        // U = E* R^3 u(d/R).
-        energy_by_radius: scale * radius * (3.0 * energy - depth * force),
         energy_by_terms: by_terms.map(|by_term| joules * by_term),
     }
 }
@@ -78,7 +75,6 @@ impl SphereContact {
             force: self.force + by.force,
             stiffness: self.stiffness + by.stiffness,
             energy: self.energy + by.energy,
-            energy_by_radius: self.energy_by_radius + by.energy_by_radius,
             ..self
         }
     }
@@ -101,11 +97,15 @@ pub fn terms_with_pad(terms: &StrainTerms, share: f64, body_modulus: f64) -> (St
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::local::indent_sphere;
+    use crate::contact::local::{SphereOnSurface, indent_sphere};
 
     const TERMS: StrainTerms = [-0.0458, -0.0446, -0.0546];
     const RADIUS: f64 = 0.01;
     const MODULUS: f64 = 12.5e3;
+
+    fn on_plane(radius: f64) -> SphereOnSurface {
+        SphereOnSurface { radius, curvature: 0.0 }
+    }
 
     /// Forces of a neo-Hookean half-space (E = 10 kPa, nu = 0.45) under a sphere of 10 mm, N, by full Newton's method on 9-node
     /// elements (`benches/strain`).
@@ -116,7 +116,7 @@ mod tests {
         for (millimetres, newtons) in [(1.0, 0.05193), (2.0, 0.14469), (5.0, 0.54750), (10.0, 1.43029), (15.0, 2.38812)]
         {
             let d: f64 = 1e-3 * millimetres;
-            let linear = indent_sphere(d, RADIUS, modulus);
+            let linear = indent_sphere(d, on_plane(RADIUS), modulus);
             let force = linear.corrected(&correct_sphere(d, RADIUS, modulus, &terms)).force;
             assert!((force / newtons - 1.0).abs() < 4e-3, "{millimetres} mm: {force} N");
             assert!(d < 3e-3 || (linear.force / newtons - 1.0).abs() > 2e-2, "the linear law at {millimetres} mm");
@@ -130,7 +130,8 @@ mod tests {
         let off = |terms: &StrainTerms| {
             let error = |(d, newtons): (f64, f64)| {
                 let modulus = 1.0 / (1.0 - 0.3 * 0.3);
-                let force = indent_sphere(d, 1.0, modulus).corrected(&correct_sphere(d, 1.0, modulus, terms)).force;
+                let force =
+                    indent_sphere(d, on_plane(1.0), modulus).corrected(&correct_sphere(d, 1.0, modulus, terms)).force;
                 (force / newtons - 1.0).abs()
             };
             [(0.2, 0.132877), (0.5, 0.514701), (0.8, 1.012844), (1.0, 1.383851)]
@@ -154,7 +155,7 @@ mod tests {
             let terms = strain_terms(&law, 0.4);
             for (d, newtons) in [0.3, 0.9, 1.5].into_iter().zip(forces) {
                 let modulus = 1.0 / (1.0 - 0.4 * 0.4);
-                let linear = indent_sphere(d, 1.0, modulus);
+                let linear = indent_sphere(d, on_plane(1.0), modulus);
                 let force = linear.corrected(&correct_sphere(d, 1.0, modulus, &terms)).force;
                 assert!((force / newtons - 1.0).abs() < 1.5e-2, "{law:?} {d}: {force} N for {newtons} N");
             }
@@ -169,10 +170,6 @@ mod tests {
             let [low, high] = [at(depth - h), at(depth + h)];
             assert!(((high.energy - low.energy) / (2.0 * h) / here.force - 1.0).abs() < 1e-7, "{depth}");
             assert!(((high.force - low.force) / (2.0 * h) / here.stiffness - 1.0).abs() < 1e-7, "{depth}");
-            let by_radius = |r| correct_sphere(depth, r, MODULUS, &TERMS).energy;
-            let h = 1e-5 * RADIUS;
-            let difference = (by_radius(RADIUS + h) - by_radius(RADIUS - h)) / (2.0 * h);
-            assert!((difference / here.energy_by_radius - 1.0).abs() < 1e-6, "{depth}");
         }
     }
 
@@ -190,8 +187,8 @@ mod tests {
     fn the_whole_is_monotonic() {
         let mut before = 0.0;
         for depth in (1..=2000).map(|k| RADIUS * 0.005 * f64::from(k)) {
-            let whole =
-                indent_sphere(depth, RADIUS, MODULUS).corrected(&correct_sphere(depth, RADIUS, MODULUS, &TERMS));
+            let whole = indent_sphere(depth, on_plane(RADIUS), MODULUS)
+                .corrected(&correct_sphere(depth, RADIUS, MODULUS, &TERMS));
             assert!(whole.force > before && whole.stiffness > 0.0, "{depth}");
             before = whole.force;
         }

@@ -20,7 +20,7 @@ pub use finite_strain::{DEEPEST_FIT, StrainTerms, correct_sphere, terms_with_pad
 pub use force_series::{HigherOrders, SERIES_FIELDS, SeriesFields, blended_series, higher_orders};
 pub use friction::{Friction, FrictionResponse};
 pub use modulus::effective_modulus;
-pub use sphere::{SphereContact, indent_sphere};
+pub use sphere::{SphereContact, SphereOnSurface, indent_sphere};
 pub use sphere_pressure::SpherePressure;
 pub use strain_law::{STRAIN_RATIOS, StrainLaw, interpolate, strain_terms};
 pub use widening::{WidenedContact, Widening};

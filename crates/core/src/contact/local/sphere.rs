@@ -1,37 +1,56 @@
-//! A rigid sphere on an elastic half-space, without friction, at any depth.
+//! A rigid sphere on an elastic body with a curved surface, without friction, at any depth.
 //!
 //! Sneddon (The relation between load and penetration in the axisymmetric Boussinesq problem for a punch of arbitrary
-//! profile, 1965, section 5): with the contact radius `a`, `x = a/R` and `t = artanh x`,
+//! profile, 1965): of the gap before loading only `g` counts,
 //!
 //! ```text
-//! d = R x t          F = E* R^2 [(1 + x^2) t - x]          dF/dd = 2 E* a
+//! d = g(a)      F = 2 E* int_0^a (d - g) ds      dF/dd = 2 E* a      U = int F dd = E* int_0^a (d - g)^2 ds
 //! ```
 //!
-//! Hertz's parabola is the limit of small `x`. With `q = d/R` the energy is
+//! The gap is that of the sphere's exact shape and of a surface with the curvature `kappa`. With `x = s/R`, `k = kappa R`:
 //!
 //! ```text
-//! U = int F dd = E* R^3 [f q - x q^2 + int_0^x (s artanh s)^2 ds],    f = F/(E* R^2)
+//! g = R (x artanh x + k x^2)        F = E* R^2 [(1 + x^2) artanh x - x + 4/3 k x^3]        at x = a/R
 //! ```
 //!
-//! by parts twice, with `df = 2 x dq`. The equation for `t` and the differences in `U` cost time, and cancel where the contact
-//! is shallow. There everything is a power series in `q`: `x = sqrt(q) X(q)`, and by integration term by term
-//! `f = q^(3/2) F(q)`, `u = q^(5/2) U(q)`. From `dy/dq = 2 y (1 - y)/(q (1 - y) + y)` for `y = x^2` follow the coefficients;
-//! the singularity closest to zero is where `sinh 2t = -2t`, at `|q| = 2.4`.
+//! A sphere of the effective radius `1/(1/R + kappa)` has the same `x^2` in `g`, as in Hertz's theory, but not the others: one
+//! radius deep in a body of four radii it has 9 % less force, and more in a hollow.
 //!
-//! Deeper, the parameter solved for is `t`, not `a`: `d = R t tanh t` keeps its relative precision at every depth, while
+//! `U` is quadratic in `k`: `u = u_0(x) + k u_1(x) + 8/15 k^2 x^5` over `E* R^3`. Up to `x = 3/5` all are power series in
+//! `y = x^2`: the closed forms cancel where the contact is shallow. Deeper, the parameter solved for is `t = artanh x`, not `a`:
 //! `1 - a/R` falls below round-off at `d = 18 R`.
 
-use crate::math::{exp, tanh};
-/// Depth over the sphere's radius below which power series are summed.
-const SERIES_BELOW: f64 = 0.5;
-/// Terms of the power series: `(0.5/2.4)^24` is below the precision of a double.
-const TERMS: usize = 24;
-/// Newton's steps for the contact radius. The start is within 4 %, so the fourth is already below round-off.
-const MAX_NEWTON_STEPS: usize = 6;
+use crate::math::{atanh, exp, tanh};
+
+/// `y` up to which power series are summed.
+const SERIES_UP_TO: f64 = 0.36;
+/// Terms of the power series: `0.36^34` is below the precision of a double.
+const TERMS: usize = 34;
+/// Relative error of a contact radius, and most steps of Newton's method to it; four are usual.
+const SETTLED: f64 = 1e-15;
+const MOST_STEPS: usize = 12;
 /// Terms of the dilogarithm's series in `exp(-2 t)`, which is at most 1/4 there.
 const DILOGARITHM_TERMS: usize = 34;
+/// Largest `y` from which a deep contact is solved.
+const LARGEST_START: f64 = 0.97;
 
-/// State of a sphere pressed into a half-space.
+/// A sphere and the surface below it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SphereOnSurface {
+    /// Radius of the sphere, m.
+    pub radius: f64,
+    /// Curvature of the surface, 1/m: positive where it is convex, above `-1/radius`.
+    pub curvature: f64,
+}
+
+impl SphereOnSurface {
+    /// Radius of the sphere on a plane that has the same gap near the contact, m.
+    pub fn effective_radius(&self) -> f64 {
+        1.0 / (1.0 / self.radius + self.curvature)
+    }
+}
+
+/// State of a sphere pressed into a body.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SphereContact {
     /// Normal force, N.
@@ -42,20 +61,24 @@ pub struct SphereContact {
     pub stiffness: f64,
     /// Stored energy `int F dd`, J.
     pub energy: f64,
-    /// Derivative of the energy with respect to the sphere's radius at constant approach, J/m. With it the force along a
-    /// surface of changing curvature follows from the same energy.
-    pub energy_by_radius: f64,
+    /// Derivative of the energy by the curvature of the surface at constant approach, J m. With it the force along a surface of
+    /// changing curvature follows from the same energy.
+    pub energy_by_curvature: f64,
 }
 
-/// A sphere of effective `radius` (m, positive) that approaches a half-space of modulus `E*` (Pa) by `approach` (m).
+/// A sphere that approaches a body of modulus `E*`, Pa, by `approach`, m.
 ///
-/// Nothing touches unless the approach is positive. Relative precision is 1e-13 at any depth.
-pub fn indent_sphere(approach: f64, radius: f64, effective_modulus: f64) -> SphereContact {
+/// Nothing touches unless the approach is positive. Relative precision is 1e-12 at any depth.
+pub fn indent_sphere(approach: f64, pair: SphereOnSurface, effective_modulus: f64) -> SphereContact {
     if approach.is_nan() || approach <= 0.0 {
         return SphereContact::default();
     }
-    let depth = approach / radius;
-    let (x, force, energy) = if depth < SERIES_BELOW { series(depth) } else { closed_form(depth) };
+    let SphereOnSurface { radius, curvature } = pair;
+    let (depth, k) = (approach / radius, curvature * radius);
+    let Unit { x, force, energy, by_curvature } = match start(depth, k) {
+        y if y < SERIES_UP_TO => shallow(depth, k, y),
+        y => deep(depth, k, y),
+    };
     let scale = effective_modulus * radius;
     let contact_radius = radius * x;
     SphereContact {
@@ -63,87 +86,108 @@ pub fn indent_sphere(approach: f64, radius: f64, effective_modulus: f64) -> Sphe
         radius: contact_radius,
         stiffness: 2.0 * effective_modulus * contact_radius,
         energy: scale * radius * radius * energy,
-        // U = E* R^3 u(d/R) and u' = f.
-        energy_by_radius: scale * radius * (3.0 * energy - depth * force),
+        energy_by_curvature: scale * radius.powi(3) * by_curvature,
     }
 }
 
-/// Solves `t tanh t = depth` for `t > 0`.
-fn parameter(depth: f64) -> f64 {
-    // t^2 = depth + depth^2/3 + .. where shallow, depth^2 where deep.
-    let mut t = (depth * (1.0 + depth * (1.0 / 3.0 + depth) / (1.0 + depth))).sqrt();
-    for _ in 0..MAX_NEWTON_STEPS {
-        let x = tanh(t);
-        let change = (t * x - depth) / (x + t * (1.0 - x * x));
-        t -= change;
-        if change.abs() <= 1e-16 * t {
-            break;
-        }
-    }
-    t
+/// The contact of a sphere of radius 1 on a body of modulus 1: `x`, `f`, `u` and `du/dk` at constant depth.
+struct Unit {
+    x: f64,
+    force: f64,
+    energy: f64,
+    by_curvature: f64,
 }
 
-/// Coefficients of `X`, `F` and `U` by powers of the depth.
-const COEFFICIENTS: [[f64; TERMS]; 3] = {
-    // Of y/q, by (Y + q Y') (1 + Y - q Y) = 2 Y (1 - q Y).
-    let mut y = [0.0; TERMS];
-    y[0] = 1.0;
-    let mut k = 1;
-    while k < TERMS {
-        // All that does not multiply Y_k; its own factor is (k + 1) 2 + 1 - 2.
-        let (mut rest, mut i) = (0.0, 0);
-        while i <= k {
-            let slope = if i < k { (i + 1) as f64 * y[i] } else { 0.0 };
-            let other = if i > 0 && i < k { y[k - i] } else { 0.0 };
-            let before = if i < k { y[k - 1 - i] } else { 0.0 };
-            rest += slope * (other - before) + if i < k { 2.0 * y[i] * before } else { 0.0 };
+/// `y` from the first two terms of `depth = (1 + k) y + y^2/3 + ..`: too large.
+fn start(depth: f64, k: f64) -> f64 {
+    let first = 1.0 + k;
+    2.0 * depth / (first + (first * first + 4.0 / 3.0 * depth).sqrt())
+}
+
+/// Coefficients by powers of `y` of `f/x` for `k = 0`, of `u_0/x`, of `u_1/x`, and of `du/dk / (-4/3 x^3)` for `k = 0`.
+const COEFFICIENTS: [[f64; TERMS]; 4] = {
+    let mut c = [[0.0; TERMS]; 4];
+    // g = sum y^n / (2 n - 1), n from 1.
+    let mut p = 1;
+    while p < TERMS {
+        let n = p as f64;
+        c[0][p] = 4.0 * n / ((2.0 * n + 1.0) * (2.0 * n - 1.0));
+        // u = int f dg.
+        let (mut sum, mut i) = (0.0, 1);
+        while i < p {
+            let m = (p - i) as f64;
+            sum += c[0][i] * 2.0 * m / (2.0 * m - 1.0);
             i += 1;
         }
-        y[k] = -rest / (2 * k + 1) as f64;
-        k += 1;
-    }
-    let mut c = [[0.0; TERMS]; 3];
-    let mut k = 0;
-    while k < TERMS {
-        // X^2 = Y.
-        let (mut rest, mut i) = (y[k], 1);
-        while i < k {
-            rest -= c[0][i] * c[0][k - i];
-            i += 1;
+        c[1][p] = sum / (2.0 * n + 1.0);
+        if p > 1 {
+            c[2][p] = (8.0 / 3.0 * (n - 1.0) / (2.0 * n - 3.0) + 2.0 * c[0][p - 1]) / (2.0 * n + 1.0);
         }
-        c[0][k] = if k == 0 { 1.0 } else { 0.5 * rest };
-        c[1][k] = 2.0 * c[0][k] / (k as f64 + 1.5);
-        c[2][k] = c[1][k] / (k as f64 + 2.5);
-        k += 1;
+        c[3][p] = n / ((2.0 * n - 1.0) * (2.0 * n + 3.0));
+        p += 1;
     }
     c
 };
 
-/// `x`, `f` and `u` of a shallow contact.
-fn series(depth: f64) -> (f64, f64, f64) {
-    // Even and odd powers apart: the additions wait for each other half as long.
-    let square = depth * depth;
-    let (mut even, mut odd) = ([0.0; 3], [0.0; 3]);
-    for k in (0..TERMS / 2).rev() {
-        for of in 0..3 {
-            even[of] = even[of] * square + COEFFICIENTS[of][2 * k];
-            odd[of] = odd[of] * square + COEFFICIENTS[of][2 * k + 1];
+/// A contact of `x < 3/5`, from a larger `y`.
+fn shallow(depth: f64, k: f64, start: f64) -> Unit {
+    let mut x = start.sqrt();
+    for _ in 0..MOST_STEPS {
+        let t = atanh(x);
+        let change = (x * (t + k * x) - depth) / (t + x / (1.0 - x * x) + 2.0 * k * x);
+        x -= change;
+        if change.abs() <= SETTLED * x {
+            break;
         }
     }
-    let [x, f, u] = std::array::from_fn(|of| even[of] + depth * odd[of]);
-    let root = depth.sqrt();
-    (root * x, depth * root * f, square * root * u)
+    let y = x * x;
+    // Even and odd powers apart: the additions wait for each other half as long.
+    let square = y * y;
+    let (mut even, mut odd) = ([0.0; 4], [0.0; 4]);
+    for p in (0..TERMS / 2).rev() {
+        for of in 0..4 {
+            even[of] = even[of] * square + COEFFICIENTS[of][2 * p];
+            odd[of] = odd[of] * square + COEFFICIENTS[of][2 * p + 1];
+        }
+    }
+    let [f, u_0, u_1, by_curvature] = std::array::from_fn(|of| even[of] + y * odd[of]);
+    Unit {
+        x,
+        force: x * (f + 4.0 / 3.0 * k * y),
+        energy: x * (u_0 + k * (u_1 + 8.0 / 15.0 * k * square)),
+        by_curvature: -4.0 / 3.0 * x * y * (by_curvature + 0.2 * k * y),
+    }
 }
 
-/// `x`, `f` and `u` of a deep contact.
-fn closed_form(depth: f64) -> (f64, f64, f64) {
-    let t = parameter(depth);
-    let x = tanh(t);
+/// A deeper contact, from `y`.
+fn deep(depth: f64, k: f64, start: f64) -> Unit {
+    // x is nearly 1 where t is large.
+    let mut t = atanh(start.min(LARGEST_START).sqrt()).max(depth - k);
+    let mut x = tanh(t);
+    for _ in 0..MOST_STEPS {
+        let slope = 1.0 - x * x;
+        let change = (x * (t + k * x) - depth) / (x + (t + 2.0 * k * x) * slope);
+        t -= change;
+        x = tanh(t);
+        if change.abs() <= SETTLED * t {
+            break;
+        }
+    }
     let y = x * x;
-    let force = (1.0 + y) * t - x;
+    let (force, own) = ((1.0 + y) * t - x, t * x);
     // int_0^x (s artanh s)^2 ds, by parts; the remaining integral is int_0^t s tanh s ds.
-    let rest = y * x * t * t / 3.0 + (y * t - (t - x)) / 3.0 - 2.0 / 3.0 * integral_of_t_tanh_t(t);
-    (x, force, force * depth - x * depth * depth + rest)
+    let squares = y * x * t * t / 3.0 + (y * t - (t - x)) / 3.0 - 2.0 / 3.0 * integral_of_t_tanh_t(t);
+    // int_0^x s^3 artanh s ds and int_0^x s artanh s ds.
+    let (third, first) = (0.25 * ((y * y - 1.0) * t + x + x * y / 3.0), 0.5 * ((y - 1.0) * t + x));
+    let [u_0, u_1] =
+        [force * own - x * own * own + squares, 4.0 / 3.0 * y * y * t - 2.0 * third + 2.0 * first - 2.0 / 3.0 * x * y];
+    let fifth = x * y * y;
+    Unit {
+        x,
+        force: force + 4.0 / 3.0 * k * x * y,
+        energy: u_0 + k * (u_1 + 8.0 / 15.0 * k * fifth),
+        by_curvature: -2.0 * (depth * x * y / 3.0 - third - 0.2 * k * fifth),
+    }
 }
 
 /// `int_0^t s tanh s ds`, from `tanh s = 1 - 2/(exp(2 s) + 1)` and `int_0^inf s/(exp(2 s) + 1) ds = pi^2/48`.
@@ -167,7 +211,13 @@ mod tests {
     use super::*;
 
     const RADIUS: f64 = 0.01;
+    const PLANE: SphereOnSurface = SphereOnSurface { radius: RADIUS, curvature: 0.0 };
     const MODULUS: f64 = 12.5e3;
+
+    /// Hollows that nearly fit the sphere, a plane, and convex surfaces, down to those of a third of its radius.
+    fn pairs() -> impl Iterator<Item = SphereOnSurface> {
+        [-0.68, -0.2, 0.0, 0.25, 3.0].into_iter().map(|k| SphereOnSurface { curvature: k / RADIUS, ..PLANE })
+    }
 
     /// Depths over the radius from a nanometre's to ten radii.
     fn depths() -> impl Iterator<Item = f64> {
@@ -177,7 +227,7 @@ mod tests {
     #[test]
     fn shallow_contacts_are_hertz() {
         for d in [1e-9, 1e-8, 1e-7] {
-            let contact = indent_sphere(d, RADIUS, MODULUS);
+            let contact = indent_sphere(d, PLANE, MODULUS);
             let hertz = 4.0 / 3.0 * MODULUS * RADIUS.sqrt() * d.powf(1.5);
             // The next term of both series is 1/6 and 3/10 of d/R.
             assert!((contact.force / hertz - 1.0).abs() < 0.5 * d / RADIUS + 1e-14);
@@ -186,20 +236,35 @@ mod tests {
         }
     }
 
-    /// Sneddon's equations as printed, in terms of the radius that was found.
+    /// Sneddon's equations, in terms of the radius that was found.
     #[test]
     fn depth_and_force_are_sneddons() {
-        for d in depths() {
-            let contact = indent_sphere(d, RADIUS, MODULUS);
-            let x = contact.radius / RADIUS;
+        for (pair, d) in pairs().flat_map(|pair| depths().map(move |d| (pair, d))) {
+            let contact = indent_sphere(d, pair, MODULUS);
+            let (x, k) = (contact.radius / RADIUS, pair.curvature * RADIUS);
             if x < 1.0 - 1e-3 {
-                assert!((x * x.atanh() * RADIUS / d - 1.0).abs() < 1e-12);
+                assert!(((x * x.atanh() + k * x * x) * RADIUS / d - 1.0).abs() < 1e-12);
             }
             if x > 0.1 && x < 1.0 - 1e-3 {
-                let force = MODULUS * RADIUS * RADIUS * ((1.0 + x * x) * x.atanh() - x);
+                let force = MODULUS * RADIUS * RADIUS * ((1.0 + x * x) * x.atanh() - x + 4.0 / 3.0 * k * x.powi(3));
                 assert!((contact.force / force - 1.0).abs() < 1e-12, "{d}: {}", contact.force / force - 1.0);
             }
             assert_eq!(contact.stiffness, 2.0 * MODULUS * contact.radius);
+        }
+    }
+
+    /// Where shallow, a sphere of the effective radius; one radius deep on a dome of four radii that has 10 % less force.
+    #[test]
+    fn a_curved_surface_counts_by_its_shape_not_by_the_effective_radius() {
+        for pair in pairs() {
+            let effective = SphereOnSurface { radius: pair.effective_radius(), curvature: 0.0 };
+            let ratio = |d| indent_sphere(d, effective, MODULUS).force / indent_sphere(d, pair, MODULUS).force;
+            assert!((ratio(1e-7) - 1.0).abs() < 1e-3, "{pair:?}");
+            let change = ratio(RADIUS) - 1.0;
+            assert!(change * pair.curvature <= 0.0, "{pair:?}");
+            if pair.curvature == 25.0 {
+                assert!((change + 0.066).abs() < 0.03, "{change}");
+            }
         }
     }
 
@@ -213,22 +278,23 @@ mod tests {
             (0.538_469_310_105_683_1, 0.478_628_670_499_366_47),
             (0.906_179_845_938_664, 0.236_926_885_056_189_08),
         ];
-        let (mut energy, mut force) = (0.0, 0.0);
-        let mut before = 0.0f64;
-        for step in 1..=2000 {
-            // With d = s^2 the integrands are smooth at zero.
-            let after = (10.0 * RADIUS).sqrt() * step as f64 / 2000.0;
-            for (x, w) in NODES {
-                let s = 0.5 * (before + after) + 0.5 * (after - before) * x;
-                let contact = indent_sphere(s * s, RADIUS, MODULUS);
-                let weight = w * s * (after - before);
-                energy += weight * contact.force;
-                force += weight * contact.stiffness;
+        for pair in pairs() {
+            let (mut energy, mut force, mut before) = (0.0, 0.0, 0.0f64);
+            for step in 1..=2000 {
+                // With d = s^2 the integrands are smooth at zero.
+                let after = (10.0 * RADIUS).sqrt() * step as f64 / 2000.0;
+                for (x, w) in NODES {
+                    let s = 0.5 * (before + after) + 0.5 * (after - before) * x;
+                    let contact = indent_sphere(s * s, pair, MODULUS);
+                    let weight = w * s * (after - before);
+                    energy += weight * contact.force;
+                    force += weight * contact.stiffness;
+                }
+                before = after;
+                let contact = indent_sphere(after * after, pair, MODULUS);
+                assert!((contact.energy / energy - 1.0).abs() < 1e-12, "{step}: {}", contact.energy / energy - 1.0);
+                assert!((contact.force / force - 1.0).abs() < 1e-12, "{step}: {}", contact.force / force - 1.0);
             }
-            before = after;
-            let contact = indent_sphere(after * after, RADIUS, MODULUS);
-            assert!((contact.energy / energy - 1.0).abs() < 1e-12, "{step}: {}", contact.energy / energy - 1.0);
-            assert!((contact.force / force - 1.0).abs() < 1e-12, "{step}: {}", contact.force / force - 1.0);
         }
     }
 
@@ -236,7 +302,7 @@ mod tests {
     fn force_grows_at_every_depth_and_so_does_the_radius() {
         let mut before = SphereContact::default();
         for d in depths() {
-            let contact = indent_sphere(d, RADIUS, MODULUS);
+            let contact = indent_sphere(d, PLANE, MODULUS);
             assert!(contact.force > before.force && contact.energy > before.energy && contact.radius > before.radius);
             assert!(contact.radius < RADIUS);
             before = contact;
@@ -245,27 +311,34 @@ mod tests {
 
     #[test]
     fn no_step_where_the_series_ends() {
-        let d = RADIUS * SERIES_BELOW;
-        let [below, above] = [d * (1.0 - 1e-14), d * (1.0 + 1e-14)].map(|d| indent_sphere(d, RADIUS, MODULUS));
-        assert!((above.force / below.force - 1.0).abs() < 1e-13);
-        assert!((above.energy / below.energy - 1.0).abs() < 1e-13);
+        for pair in pairs() {
+            let d = RADIUS * SERIES_UP_TO * (1.0 + pair.curvature * RADIUS + SERIES_UP_TO / 3.0);
+            let [below, above] = [d * (1.0 - 1e-14), d * (1.0 + 1e-14)].map(|d| indent_sphere(d, pair, MODULUS));
+            for ratio in [
+                above.force / below.force,
+                above.energy / below.energy,
+                above.energy_by_curvature / below.energy_by_curvature,
+            ] {
+                assert!((ratio - 1.0).abs() < 1e-13, "{ratio}");
+            }
+        }
     }
 
     #[test]
-    fn energy_changes_with_the_radius_as_said() {
-        for d in [1e-5, 1e-3, 4e-3, 3e-2] {
-            let at = |radius| indent_sphere(d, radius, MODULUS);
-            let h = 1e-4 * RADIUS;
-            let difference = (at(RADIUS + h).energy - at(RADIUS - h).energy) / (2.0 * h);
-            let computed = at(RADIUS).energy_by_radius;
-            assert!((difference / computed - 1.0).abs() < 1e-7, "{d}: {difference} {computed}");
+    fn energy_changes_with_the_curvature() {
+        for (pair, d) in pairs().flat_map(|pair| [1e-5, 1e-3, 4e-3, 3e-2].map(|d| (pair, d))) {
+            let at = |curvature| indent_sphere(d, SphereOnSurface { curvature, ..pair }, MODULUS);
+            let h = 1e-2;
+            let difference = (at(pair.curvature + h).energy - at(pair.curvature - h).energy) / (2.0 * h);
+            let computed = at(pair.curvature).energy_by_curvature;
+            assert!((difference / computed - 1.0).abs() < 1e-6, "{d}: {difference} {computed}");
         }
     }
 
     #[test]
     fn nothing_touches_from_outside() {
         for d in [0.0, -1e-3, f64::NEG_INFINITY, f64::NAN] {
-            assert_eq!(indent_sphere(d, RADIUS, MODULUS), SphereContact::default());
+            assert_eq!(indent_sphere(d, PLANE, MODULUS), SphereContact::default());
         }
     }
 }

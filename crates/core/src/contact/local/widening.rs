@@ -12,7 +12,7 @@
 //! so that force, stiffness and the forces along a surface on which anything changes follow from one energy.
 
 use super::finite_strain::{StrainCorrection, StrainTerms, correct_sphere};
-use super::sphere::{SphereContact, indent_sphere};
+use super::sphere::{SphereContact, SphereOnSurface, indent_sphere};
 use crate::math::cbrt;
 
 /// Newton's steps for the approach of the sphere alone. Three are usual.
@@ -43,20 +43,20 @@ pub struct WidenedContact {
 }
 
 impl Widening {
-    /// A sphere of effective `radius` (m) that approaches a half-space of modulus `E*` (Pa) and of coefficients of finite strain by
-    /// `approach` (m); a linear body has none.
+    /// A sphere that approaches a body of modulus `E*` (Pa) and of coefficients of finite strain by `approach` (m); a linear body has
+    /// none.
     pub fn indent(
         self,
         approach: f64,
-        radius: f64,
+        pair: SphereOnSurface,
         effective_modulus: f64,
         terms: Option<&StrainTerms>,
     ) -> WidenedContact {
         let indent = |approach: f64| {
-            let sphere = indent_sphere(approach, radius, effective_modulus);
+            let sphere = indent_sphere(approach, pair, effective_modulus);
             match terms {
                 Some(terms) => {
-                    let correction = correct_sphere(approach, radius, effective_modulus, terms);
+                    let correction = correct_sphere(approach, pair.radius, effective_modulus, terms);
                     (sphere.corrected(&correction), correction)
                 }
                 None => (sphere, StrainCorrection::default()),
@@ -71,7 +71,7 @@ impl Widening {
             let energy_by_terms = correction.energy_by_terms;
             return WidenedContact { sphere, energy_by_modulus, energy_by_rate: 0.0, energy_by_terms };
         }
-        let mut growth = 1.0;
+        let (mut growth, radius) = (1.0, pair.effective_radius());
         for _ in 0..MOST_STEPS {
             let area = hertz_area(sphere.force, radius, effective_modulus);
             let residual = own + self.rate * sphere.force * (4.0 / 3.0 * area - self.reference) - whole;
@@ -100,7 +100,7 @@ impl Widening {
             sphere: SphereContact {
                 stiffness: sphere.stiffness / growth,
                 energy: sphere.energy + self.rate * (force * force * (4.0 / 3.0 * area - self.reference) - wide),
-                energy_by_radius: sphere.energy_by_radius - by_area / radius,
+                energy_by_curvature: sphere.energy_by_curvature + by_area * radius,
                 ..sphere
             },
             energy_by_modulus: (sphere.energy + by_area) / effective_modulus,
@@ -121,6 +121,7 @@ mod tests {
 
     const MODULUS: f64 = 6e3;
     const RADIUS: f64 = 5e-3;
+    const PAIR: SphereOnSurface = SphereOnSurface { radius: RADIUS, curvature: 40.0 };
     const TERMS: StrainTerms = [-0.05, -0.04, -0.05];
 
     fn widenings() -> impl Iterator<Item = Widening> {
@@ -140,7 +141,7 @@ mod tests {
     fn force_and_stiffness_are_derivatives_of_the_energy() {
         for widening in widenings() {
             for depth in [0.02, 0.1, 0.3, 0.8].map(|d| d * RADIUS) {
-                let at = |d: f64| widening.indent(d, RADIUS, MODULUS, Some(&TERMS)).sphere;
+                let at = |d: f64| widening.indent(d, PAIR, MODULUS, Some(&TERMS)).sphere;
                 let contact = at(depth);
                 assert!((slope(|d| at(d).energy, depth) / contact.force - 1.0).abs() < 1e-6, "{widening:?} {depth}");
                 assert!((slope(|d| at(d).force, depth) / contact.stiffness - 1.0).abs() < 1e-6, "{widening:?} {depth}");
@@ -149,18 +150,22 @@ mod tests {
     }
 
     #[test]
-    fn derivatives_by_radius_modulus_and_rate_are_those_of_the_energy() {
+    fn derivatives_by_curvature_modulus_and_rate_are_those_of_the_energy() {
         for widening in widenings() {
             let depth = 0.3 * RADIUS;
-            let energy = |rate, radius, modulus| {
-                Widening { rate, ..widening }.indent(depth, radius, modulus, Some(&TERMS)).sphere.energy
+            let energy = |rate, curvature, modulus| {
+                let pair = SphereOnSurface { curvature, ..PAIR };
+                Widening { rate, ..widening }.indent(depth, pair, modulus, Some(&TERMS)).sphere.energy
             };
-            let contact = widening.indent(depth, RADIUS, MODULUS, Some(&TERMS));
+            let contact = widening.indent(depth, PAIR, MODULUS, Some(&TERMS));
             let close = |a: f64, b: f64| (a - b).abs() < 1e-6 * b.abs().max(1e-3 * contact.sphere.energy);
-            assert!(close(slope(|r| energy(widening.rate, r, MODULUS), RADIUS), contact.sphere.energy_by_radius));
-            assert!(close(slope(|e| energy(widening.rate, RADIUS, e), MODULUS), contact.energy_by_modulus));
+            assert!(close(
+                slope(|k| energy(widening.rate, k, MODULUS), PAIR.curvature),
+                contact.sphere.energy_by_curvature
+            ));
+            assert!(close(slope(|e| energy(widening.rate, PAIR.curvature, e), MODULUS), contact.energy_by_modulus));
             if widening.rate != 0.0 {
-                assert!(close(slope(|k| energy(k, RADIUS, MODULUS), widening.rate), contact.energy_by_rate));
+                assert!(close(slope(|k| energy(k, PAIR.curvature, MODULUS), widening.rate), contact.energy_by_rate));
             }
         }
     }
@@ -168,10 +173,10 @@ mod tests {
     /// The displacement of a sphere's centre is that of the half-space and `C(a) F`, as long as the radius is the reference's.
     #[test]
     fn at_the_reference_the_regular_part_is_that_of_the_body() {
-        let alone = indent_sphere(0.25 * RADIUS, RADIUS, MODULUS);
-        let area = hertz_area(alone.force, RADIUS, MODULUS);
+        let alone = indent_sphere(0.25 * RADIUS, PAIR, MODULUS);
+        let area = hertz_area(alone.force, PAIR.effective_radius(), MODULUS);
         let widening = Widening { rate: 0.5 / (MODULUS * RADIUS.powi(3)), reference: area };
         let approach = 0.25 * RADIUS + widening.rate * alone.force * area / 3.0;
-        assert!((widening.indent(approach, RADIUS, MODULUS, None).sphere.force / alone.force - 1.0).abs() < 1e-12);
+        assert!((widening.indent(approach, PAIR, MODULUS, None).sphere.force / alone.force - 1.0).abs() < 1e-12);
     }
 }

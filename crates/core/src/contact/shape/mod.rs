@@ -17,6 +17,9 @@ use crate::math::hypot;
 use crate::tensor::outer;
 use crate::{Error, Result};
 
+/// Extent of a capsule across its axis that counts, over that along it.
+const UPRIGHT_EXTENT: f64 = 0.02;
+
 /// Shape of a tool.
 #[derive(Clone, Debug)]
 pub enum ToolShape {
@@ -221,7 +224,9 @@ impl ToolShape {
     pub fn extents(&self) -> DMat3 {
         let along = |axis: DVec3| outer(axis, axis);
         match *self {
-            Self::Sphere { .. } | Self::Capsule { .. } => along(DVec3::Z),
+            Self::Sphere { .. } => along(DVec3::Z),
+            // One that stands upright is round too, and the cells have to keep a direction.
+            Self::Capsule { .. } => along(DVec3::Z) + along(DVec3::X) * UPRIGHT_EXTENT,
             // Its face is round, so the axis that lies in the face serves as well as any.
             Self::Punch { .. } => along(DVec3::X),
             // That of its shadow.

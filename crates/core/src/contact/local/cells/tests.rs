@@ -6,7 +6,7 @@ use glam::{DQuat, EulerRot};
 
 use super::references::{Quadric, hertz_ellipse};
 use super::*;
-use crate::contact::local::{ContactPlane, ToolPose, indent_sphere};
+use crate::contact::local::{ContactPlane, SphereOnSurface, ToolPose, indent_sphere};
 use crate::contact::shape::{SurfaceShape, tests::sphere_mesh};
 
 const MODULUS: f64 = 12.5e3;
@@ -59,6 +59,10 @@ fn near(value: f64, expected: f64, tolerance: f64) -> bool {
     (value / expected - 1.0).abs() < tolerance
 }
 
+fn on_plane(radius: f64) -> SphereOnSurface {
+    SphereOnSurface { radius, curvature: 0.0 }
+}
+
 #[test]
 fn a_sphere_is_sneddons() {
     let shape = ToolShape::sphere(0.01).unwrap();
@@ -67,7 +71,7 @@ fn a_sphere_is_sneddons() {
     {
         for depth in [1e-5, 5e-4, 2e-3, 5e-3] {
             let contact = cold(&CellProblem { resolution, ..pressed(&shape, DVec3::ZERO, depth) });
-            let sphere = indent_sphere(depth, 0.01, MODULUS);
+            let sphere = indent_sphere(depth, on_plane(0.01), MODULUS);
             assert!(near(contact.force.z, sphere.force, tolerance), "{resolution:?} {depth}: {contact:?} {sphere:?}");
             assert!(near(contact.energy, sphere.energy, tolerance), "{resolution:?} {depth}");
             // Cells at the rim count as whole.
@@ -430,7 +434,7 @@ fn a_sphere_in_a_hollow_is_a_flatter_sphere() {
     for curvature in [-30.0, -60.0] {
         for depth in [1e-4, 5e-4] {
             let problem = pressed(&shape, DVec3::ZERO, depth);
-            let expected = indent_sphere(depth, 1.0 / (125.0 + curvature), MODULUS).force;
+            let expected = indent_sphere(depth, SphereOnSurface { radius: 1.0 / 125.0, curvature }, MODULUS).force;
             assert!(
                 near(cold_on([curvature, 0.0, curvature], &problem).force.z, expected, 0.02),
                 "{curvature} {depth}"
@@ -445,7 +449,7 @@ fn a_capsule_on_its_end_is_a_sphere() {
     let shape = ToolShape::capsule(0.004, 0.010).unwrap();
     for tilt in [0.0, 5e-4, 2e-3, 0.05, 0.5] {
         let contact = cold(&pressed(&shape, DVec3::new(tilt, 0.3 * tilt, 0.4), 1e-3));
-        let sphere = indent_sphere(1e-3, 0.004, MODULUS);
+        let sphere = indent_sphere(1e-3, on_plane(0.004), MODULUS);
         assert!(near(contact.force.z, sphere.force, 0.004), "{tilt}");
         assert!(contact.torque.length() < 1e-6 * 0.004 * sphere.force, "{tilt}: {}", contact.torque);
     }

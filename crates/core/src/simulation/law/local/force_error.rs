@@ -95,6 +95,7 @@ pub fn estimate(
     }
     let around = surroundings();
     let inverse_thickness = around.inverse_thickness;
+    let radius = tool.shape.thickness();
     let (known, fraction) = (response.known, response.higher.fraction.max(0.0));
     // Above a support the approach of the half-space is larger than the tool's.
     let depth = if contact.depth > 0.0 { contact.depth } else { indentation.depth };
@@ -103,16 +104,16 @@ pub fn estimate(
     let parts = [
         CONSTANT,
         by_elements * indentation.force * material.share / (material.modulus * material.width * depth),
-        by_size(response, &around, (free, depth)),
+        by_size(response, &around, radius, (free, depth)),
         local_error(tool, response),
         known * BY_SERIES * 0.01 * fraction.powi(3),
         (1.0 - known) * BY_DEPTH * ((depth + around.by_loads.length()) * inverse_thickness).powi(2),
-        BY_OTHERS * around.by_others.length() / depth * (depth / indentation.effective_radius).min(1.0),
+        BY_OTHERS * around.by_others.length() / depth * (depth / radius).min(1.0),
         sticking(material.poisson) * (around.friction / STICKING).min(1.0),
         if contact.local.is_fading { ON_PLANE } else { 0.0 },
     ];
     // Deeper than that the force stays what it is there.
-    let most = (MOST_RADII * indentation.effective_radius).min(MOST_THICKNESS / inverse_thickness);
+    let most = (MOST_RADII * radius).min(MOST_THICKNESS / inverse_thickness);
     let beyond = if tool.shape.needs_cells() { 0.0 } else { (indentation.depth - most).max(0.0) };
     let local = 1.0 - (indentation.stiffness * beyond / indentation.force).clamp(0.0, 1.0);
     let series = 1.0 - known * (1.0 - SERIES_REACH / fraction.max(SERIES_REACH));
@@ -121,8 +122,8 @@ pub fn estimate(
     ForceError { relative: parts.iter().sum::<f64>() + (1.0 - held), held }
 }
 
-/// Error by the thickness and the breadth of the body; `free` is zero above a support and one for a plate or a column.
-fn by_size(response: &LocalResponse, around: &Surroundings, (free, depth): (f64, f64)) -> f64 {
+/// Error by the thickness and the breadth of the body, for a tool of a radius; `free` is zero above a support and one for a plate or a column.
+fn by_size(response: &LocalResponse, around: &Surroundings, radius: f64, (free, depth): (f64, f64)) -> f64 {
     let indentation = &response.indentation;
     let material = &indentation.material;
     let [wide, broad] = [around.inverse_thickness, around.inverse_breadth].map(|inverse| material.width * inverse);
@@ -131,7 +132,7 @@ fn by_size(response: &LocalResponse, around: &Surroundings, (free, depth): (f64,
     let plate = ((wide - PLATE[0]) / (PLATE[1] - PLATE[0])).clamp(0.0, 1.0) * coarse * coarse.sqrt();
     let volumetric = (1.0 / (1.0 - 2.0 * material.poisson)).min(MOST_INCOMPRESSIBLE);
     let column = BY_BREADTH[1] * (cube * cube).min(MOST_BREADTH) * (1.0 - thin);
-    let s = (indentation.depth / indentation.effective_radius).clamp(0.0, DEEPEST * DEEPEST).sqrt();
+    let s = (indentation.depth / radius).clamp(0.0, DEEPEST * DEEPEST).sqrt();
     let stiffening = (material.share * correction(material, s)).max(0.0);
     (1.0 - free) * (BY_BREADTH[0] * cube.min(1.0) + BY_SQUEEZING * thin * depth * around.inverse_thickness)
         + free * (column + plate * BY_BENDING[1].mul_add(volumetric, BY_BENDING[0]))
@@ -156,7 +157,7 @@ fn local_error(tool: &ToolModel, response: &LocalResponse) -> f64 {
         let part = if corrected { BY_ELLIPSOID } else { BY_SHAPE };
         return part * correction((0.75 * pressure).min(DEEPEST));
     }
-    let s = (indentation.depth / indentation.effective_radius).max(0.0).sqrt();
+    let s = (indentation.depth / tool.shape.thickness()).max(0.0).sqrt();
     let [low, high] = STRAIN_RATIOS;
     let outside = (low - material.poisson).max(material.poisson - high).max(0.0);
     let beyond = (s * s - DEEPEST_FIT).max(0.0);

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use crate::contact::footprint::PressedSurface;
 use crate::contact::local::{SeriesFields, StrainTerms, effective_modulus, terms_with_pad};
-use crate::contact::regular::{FanFields, PLANE_STRAIN, POISSON, STRAIN_TERMS, WIDTH};
+use crate::contact::regular::{FanFields, INVERSE_MODULUS, POISSON, STRAIN_TERMS, WIDTH};
 use crate::contact::shape::ToolShape;
 use crate::contact::smooth::{Blended, DrawnSurface, SmoothSurface};
 use crate::contact::{ConvexEdges, CornerSurface};
@@ -66,8 +66,8 @@ pub struct HalfSpace {
     /// `E*`, Pa, and its gradient by the position of the foot's point.
     pub modulus: f64,
     pub slope: DVec3,
-    /// Its derivative by the body's own `E/(1 - nu^2)`.
-    pub by_body_modulus: f64,
+    /// Its derivative by the field of the inverse modulus.
+    pub by_inverse_modulus: f64,
     /// `k_t / k_n`.
     pub tangential: f64,
     /// Coefficients of finite strain, and their gradients by the position of the foot's point.
@@ -81,11 +81,12 @@ pub struct HalfSpace {
 impl HalfSpace {
     /// From the body's constants at the foot and the tool's pad; a contact has a `part` of its modulus.
     pub fn new(body: LocalBody<'_>, tool: LocalTool<'_>, fields: &Fields, part: f64) -> Self {
-        let own = body.scale * fields.values[PLANE_STRAIN];
+        let own = body.scale / fields.values[INVERSE_MODULUS];
+        let own_by_inverse = -own / fields.values[INVERSE_MODULUS];
         let whole = effective_modulus(own, 0.0, tool.pad);
         let modulus = part * whole;
-        let by_body_modulus = part * body.scale * (whole / own).powi(2);
-        let slope = fields.slope(PLANE_STRAIN) * by_body_modulus;
+        let by_inverse_modulus = part * (whole / own).powi(2) * own_by_inverse;
+        let slope = fields.slope(INVERSE_MODULUS) * by_inverse_modulus;
         let poisson = fields.values[POISSON];
         let tangential = 2.0 * (1.0 - poisson) / (2.0 - poisson);
         let body_terms: StrainTerms = std::array::from_fn(|k| fields.values[STRAIN_TERMS.start + k]);
@@ -94,7 +95,7 @@ impl HalfSpace {
         if body.is_hyperelastic {
             let by_own;
             (strain_terms, by_own) = terms_with_pad(&body_terms, share, own);
-            let body_slope = fields.slope(PLANE_STRAIN) * body.scale;
+            let body_slope = fields.slope(INVERSE_MODULUS) * own_by_inverse;
             strain_slopes = std::array::from_fn(|k| {
                 fields.slope(STRAIN_TERMS.start + k) * share.powi(k as i32 + 2) + body_slope * by_own[k]
             });
@@ -103,7 +104,7 @@ impl HalfSpace {
             material: LocalMaterial { poisson, strain_terms: body_terms, share, modulus, width: fields.values[WIDTH] },
             modulus,
             slope,
-            by_body_modulus,
+            by_inverse_modulus,
             tangential,
             strain_terms,
             strain_slopes,
@@ -120,8 +121,6 @@ pub struct Indentation {
     pub material: LocalMaterial,
     /// Depth of the tool in the surface, m.
     pub depth: f64,
-    /// Radius of the sphere that the tool counts as on the plane, m; zero where nothing touches.
-    pub effective_radius: f64,
     /// Normal force, N.
     pub force: f64,
     /// Contact radius, or that of the circle of the same stiffness, m.

@@ -306,7 +306,10 @@ impl Law for Local {
     }
 
     fn store_entry_depth(&self, _model: &Model, state: &mut State, contact: &Contact) {
-        state.tools[contact.tool].entry[contact.body].previous = contact.depth.max(0.0);
+        let entry = &mut state.tools[contact.tool].entry[contact.body];
+        // One that began deeper than its tool is now goes on from there.
+        entry.previous = contact.depth.max(0.0);
+        entry.threshold = entry.threshold.max(contact.local.entry_depth);
     }
 
     fn find_additional_by_force(&self, model: &Model, state: &mut State, memory: TickMemory<'_>, body: usize) {

@@ -5,7 +5,7 @@ use glam::{DMat3, DVec3};
 use super::half_space::{Fields, Indentation, LocalBody};
 use super::inclination::{OtherContacts, slope};
 use crate::contact::BesideEdges;
-use crate::contact::regular::{PLANE_STRAIN, blend_fields};
+use crate::contact::regular::{INVERSE_MODULUS, blend_fields};
 use crate::contact::smooth::{FanWeights, FootPoint};
 use crate::tensor::outer;
 
@@ -36,7 +36,7 @@ impl NearEdge {
     /// Gives the half-space its share of the modulus.
     pub fn soften(&self, fields: &mut Fields) {
         let share = &self.beside.share;
-        fields.divide(PLANE_STRAIN, (1.0 / share.value, -share.gradient / (share.value * share.value)));
+        fields.divide(INVERSE_MODULUS, (share.value, share.gradient));
     }
 
     /// Derivative of the force on the body by the position that comes from edges, N/m. The energy of the half-space goes with its

@@ -8,10 +8,11 @@ use super::near_edge::NearEdge;
 use super::wrench::{CellMemory, indent_shape, placed_shape};
 use crate::contact::footprint::PressedSurface;
 use crate::contact::local::{
-    Friction, FrictionResponse, HigherOrders, SERIES_FIELDS, WidenedContact, Widening, blended_series, higher_orders,
+    Friction, FrictionResponse, HigherOrders, SERIES_FIELDS, SphereOnSurface, WidenedContact, Widening, blended_series,
+    higher_orders,
 };
 use crate::contact::regular::{
-    GAUSS, MEAN, PLANE_STRAIN, WIDENING, WIDTH, blend_fields, compliance_of, reference_area,
+    GAUSS, INVERSE_MODULUS, MEAN, WIDENING, WIDTH, blend_fields, compliance_of, reference_area,
 };
 use crate::contact::shape::ToolShape;
 use crate::contact::smooth::{Blended, FanWeights, FootPoint};
@@ -205,11 +206,11 @@ pub(super) fn evaluate_shape(
     let (mut modulus_turns, mut width_turns, mut compliance_turns) = (DVec3::ZERO, DVec3::ZERO, motion_turn);
     for (fan, turn) in weights.with_turns() {
         let own = &pressed.fields[fan];
-        modulus_turns += turn * own[PLANE_STRAIN];
+        modulus_turns += turn * own[INVERSE_MODULUS];
         width_turns += turn * own[WIDTH];
         compliance_turns += turn * (0.5 / body.scale * force.dot(compliance_of(own) * force));
     }
-    modulus_turns *= half_space.by_body_modulus;
+    modulus_turns *= half_space.by_inverse_modulus;
     let indentation = indent_shape(
         &pressed.fine,
         tool,
@@ -244,14 +245,15 @@ fn indent(
     let least = LEAST_CURVATURE_PRODUCT * curved * curved;
     let root = (product * product + least * least).sqrt();
     let (bounded, share) = (0.5 * (product + root), 0.5 * (1.0 + product / root));
-    let radius = 1.0 / bounded.sqrt();
-    let radius_slope = product_slope * (-0.5 * radius * radius * radius * share);
+    // That of a surface of revolution with the same product.
+    let pair = SphereOnSurface { radius: tool.radius, curvature: bounded.sqrt() - curved };
+    let curvature_slope = product_slope * (0.5 * share / bounded.sqrt());
     let rate_slope = fields.slope(WIDENING) / body.scale;
     let widening = Widening { rate: fields.values[WIDENING] / body.scale, reference: reference_area(tool.radius) };
     let WidenedContact { sphere, energy_by_modulus, energy_by_rate, energy_by_terms } =
-        widening.indent(depth, radius, half_space.modulus, body.is_hyperelastic.then_some(&half_space.strain_terms));
+        widening.indent(depth, pair, half_space.modulus, body.is_hyperelastic.then_some(&half_space.strain_terms));
     let by_terms: DVec3 = half_space.strain_slopes.iter().zip(energy_by_terms).map(|(&slope, by)| slope * by).sum();
-    let gradient = radius_slope * sphere.energy_by_radius
+    let gradient = curvature_slope * sphere.energy_by_curvature
         + half_space.slope * energy_by_modulus
         + rate_slope * energy_by_rate
         + by_terms
@@ -259,7 +261,6 @@ fn indent(
     Indentation {
         material: half_space.material,
         depth,
-        effective_radius: radius,
         force: sphere.force,
         radius: sphere.radius,
         stiffness: sphere.stiffness,

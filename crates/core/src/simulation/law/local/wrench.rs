@@ -98,7 +98,6 @@ pub fn indent_shape(
         force: pressed.normal_force,
         material: half_space.material,
         depth: pressed.overlap,
-        effective_radius: tool.shape.thickness(),
         radius: pressed.stiffness / (2.0 * half_space.modulus),
         stiffness: pressed.stiffness,
         energy: pressed.energy,
@@ -122,7 +121,8 @@ mod tests {
     use crate::contact::SurfaceQuery;
     use crate::contact::footprint::PressedSurface;
     use crate::contact::local::effective_modulus;
-    use crate::contact::regular::{FanFields, PLANE_STRAIN, POISSON, STRAIN_TERMS, WIDTH};
+    use crate::contact::local::{SphereOnSurface, indent_sphere};
+    use crate::contact::regular::{FanFields, INVERSE_MODULUS, POISSON, STRAIN_TERMS, WIDTH};
     use crate::contact::smooth::tests::{ball, cube, near};
     use crate::contact::smooth::{DrawnSurface, FanWeights, SmoothSurface};
     use crate::mesh::Surface;
@@ -131,7 +131,7 @@ mod tests {
     use crate::simulation::law::local::near_corner::evaluate;
     use crate::simulation::law::local::response::{Guess, LocalResponse};
 
-    /// A body whose modulus rises by a half over a length of two.
+    /// A body whose modulus rises by two thirds over a length of two.
     struct Body {
         surface: Surface,
         query: SurfaceQuery,
@@ -146,7 +146,7 @@ mod tests {
             let modulus = |z: f64| 1e4 * (1.0 + 0.25 * z) / (1.0 - 0.45 * 0.45);
             let fields = smooth.fans().iter().map(|fan| {
                 let mut fields = FanFields::default();
-                (fields[PLANE_STRAIN], fields[POISSON]) = (modulus(fan.position.z), 0.45);
+                (fields[INVERSE_MODULUS], fields[POISSON]) = (1.0 / modulus(fan.position.z), 0.45);
                 fields[WIDTH] = 0.5 + 0.1 * fan.position.x;
                 fields[STRAIN_TERMS].copy_from_slice(&[-0.2, 0.1, -0.15]);
                 fields
@@ -273,9 +273,9 @@ mod tests {
         let body = Body::new(ball(24));
         let round = ToolShape::ellipsoid(DVec3::splat(0.2)).expect("a shape");
         let expected = body.press(&round, DVec3::Z * 1.18, DQuat::from_rotation_x(0.7)).indentation;
-        // The relative radius is 1/(5 + 1), the depth 0.02 less what it began with.
+        // The depth is 0.02 less what it began with.
         let modulus = effective_modulus(1.25e4, 0.45, None);
-        let sphere = crate::contact::local::indent_sphere(0.017, 1.0 / 6.0, modulus);
+        let sphere = indent_sphere(0.017, SphereOnSurface { radius: 0.2, curvature: 1.0 }, modulus);
         // The body's material beyond small strain (`Body::new`), by the sphere's own s.
         let s = (0.017_f64 / 0.2).sqrt();
         let force = sphere.force * (1.0 - 0.2 * s + 0.1 * s * s - 0.15 * s.powi(3));
