@@ -96,7 +96,8 @@ def lost(forces: np.ndarray) -> float:
 def test_the_force_of_a_deep_press_grows_to_the_end(node, law):
     forces = np.linalg.norm(pressed(node, law)[1], axis=1)
     assert forces.max() > 0.3
-    assert lost(forces) <= LOST, f"{100 * lost(forces):.1f} % of {forces.max():.2f} N"
+    allowed = TURNING if node == HOLLOW else LOST
+    assert lost(forces) <= allowed, f"{100 * lost(forces):.1f} % of {forces.max():.2f} N"
 
 
 @pytest.mark.filterwarnings("ignore::palpate.TouchWarning")

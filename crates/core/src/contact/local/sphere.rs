@@ -24,10 +24,13 @@ use crate::math::{atanh, exp, tanh};
 
 /// `y` up to which power series are summed.
 const SERIES_UP_TO: f64 = 0.36;
-/// Terms of the power series: `0.36^34` is below the precision of a double.
+/// Terms of the power series, `0.36^34` is below the precision of a double; and those that suffice up to a smaller `y`.
 const TERMS: usize = 34;
-/// Relative error of a contact radius, and most steps of Newton's method to it; four are usual.
-const SETTLED: f64 = 1e-15;
+const FEW_TERMS: usize = 16;
+const FEW_UP_TO: f64 = 0.1;
+/// Relative length of the last step of Newton's method for the contact radius, whose square is the error that is left; and most steps.
+/// Three are usual.
+const SETTLED: f64 = 1e-8;
 const MOST_STEPS: usize = 12;
 /// Terms of the dilogarithm's series in `exp(-2 t)`, which is at most 1/4 there.
 const DILOGARITHM_TERMS: usize = 34;
@@ -144,7 +147,8 @@ fn shallow(depth: f64, k: f64, start: f64) -> Unit {
     // Even and odd powers apart: the additions wait for each other half as long.
     let square = y * y;
     let (mut even, mut odd) = ([0.0; 4], [0.0; 4]);
-    for p in (0..TERMS / 2).rev() {
+    let terms = if y < FEW_UP_TO { FEW_TERMS } else { TERMS };
+    for p in (0..terms / 2).rev() {
         for of in 0..4 {
             even[of] = even[of] * square + COEFFICIENTS[of][2 * p];
             odd[of] = odd[of] * square + COEFFICIENTS[of][2 * p + 1];

@@ -225,8 +225,9 @@ impl ToolShape {
         let along = |axis: DVec3| outer(axis, axis);
         match *self {
             Self::Sphere { .. } => along(DVec3::Z),
-            // One that stands upright is round too, and the cells have to keep a direction.
-            Self::Capsule { .. } => along(DVec3::Z) + along(DVec3::X) * UPRIGHT_EXTENT,
+            // One that stands upright is round too, and the cells have to keep a direction. Between the axes of the tool: edges are
+            // often parallel to these, and a row of cells that passes an edge at once has no exact gradient.
+            Self::Capsule { .. } => along(DVec3::Z) + along(DVec3::new(0.8, 0.6, 0.0)) * UPRIGHT_EXTENT,
             // Its face is round, so the axis that lies in the face serves as well as any.
             Self::Punch { .. } => along(DVec3::X),
             // That of its shadow.
