@@ -6,7 +6,7 @@ import signal
 import sys
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -22,6 +22,7 @@ from palpate.cli.bodies import (
     is_surface,
 )
 from palpate.cli.completion import units
+from palpate.cli.scene_lines import print_scene
 from palpate.cli.store_lines import green_line, precision_line
 from palpate.segmentation.endings import is_segmentation
 from palpate.startup import restore_interrupts
@@ -195,7 +196,6 @@ def info(
     from palpate.green import GreensFunction
     from palpate.green.series import lines_of_series, series_line
     from palpate.mesh import TetMesh
-    from palpate.scene import Scene
 
     if file.name.endswith(".modes.palpate"):
         basis = ModalBasis.load(file)
@@ -214,18 +214,7 @@ def info(
             print(f"  {line}")
         return
     if file.suffix == ".toml":
-        scene = Scene.read(file)
-        scene.require_files()
-        print(f"{file}: scene of {scene.name}")
-        entries = scene.model_dump(by_alias=True, exclude_none=True)
-        for owner, entry in zip([scene, *scene.bodies], [entries, *entries["body"]], strict=True):
-            if owner.material is not None:  # the modulus may be that of the law's constants
-                entry["material"]["youngs_modulus"] = owner.material.material().youngs_modulus
-        for name, value in entries.items():
-            _print_entry(name, value)
-        if any(tool.radius is None or tool.contact_radius is None for tool in scene.tools):
-            print("  radii of tools that are not given: a sixteenth of the longest side of the body")
-        print("  lengths in m, pressures in Pa, forces in N, times in s")
+        print_scene(file)
         return
     if is_segmentation(file):
         from palpate.cli.segmentations import print_segmentation
@@ -245,18 +234,6 @@ def info(
     print(
         f"  regions: {sorted(set(tets.regions.tolist()))}, dihedral angle >= {tets.dihedral_angles().min():.1f} degrees"
     )
-
-
-def _print_entry(name: str, value: Any) -> None:
-    """Print the keys under a name of a scene, those of several tables with their number."""
-    if isinstance(value, dict):
-        for key, inner in value.items():
-            _print_entry(f"{name}.{key}", inner)
-    elif isinstance(value, list) and value and isinstance(value[0], dict):
-        for rank, entry in enumerate(value):
-            _print_entry(name if len(value) == 1 else f"{name}[{rank}]", entry)
-    elif value != []:
-        print(f"  {name} = {value}")
 
 
 @app.command("models")

@@ -18,6 +18,7 @@ from palpate.cli import app as command_line
 from palpate.cli.bodies import likely_units
 from palpate.cli.run_file import RunOptions, built_from
 from palpate.models import NAMES
+from palpate.scene import Scene
 from palpate.scene.default_radius import default_contact_radius, default_radius
 from palpate.validation.verify import BENCHMARKS
 
@@ -86,7 +87,11 @@ def test_options_of_a_bare_surface_are_those_of_a_scene(capsys, tmp_path):
 def test_a_bare_volume_mesh_runs_too(capsys, tmp_path):
     box_mesh().write(tmp_path / "box.vtu", unit="mm")
     built = built_from(tmp_path / "box.vtu", RunOptions())
-    assert "unit mm (--unit;" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "unit mm (--unit;" in printed and "law neo-hookean" in printed
+    # As of a scene without [material].
+    assert built.bodies[0].body.material.law == built.scene.material.law == Scene(body={"model": "beam"}).material.law
+    assert "series beyond small strain below spheres of 5 mm" in printed
     assert built.bodies[0].body.mesh.volume == pytest.approx(0.08 * 0.05 * 0.05)
     with pytest.raises(palpate.MeshError, match="--part, --max-volume-loss and --segment are for files"):
         built_from(tmp_path / "box.vtu", RunOptions(part="all"))
@@ -132,6 +137,27 @@ def test_wrong_options_are_refused_by_name_for_scenes_and_bare_files(options, me
     box_mesh().write(tmp_path / "box.vtu")
     with pytest.raises(palpate.Error):
         built_from(tmp_path / "box.vtu", RunOptions(**options))
+
+
+def test_a_tool_larger_than_the_body_is_refused_before_columns_are_computed(block_green, monkeypatch, tmp_path):
+    def compute(*_, **__):
+        raise AssertionError("computing")
+
+    for place in ("palpate.scene.build.precompute", "palpate.green.precompute"):
+        monkeypatch.setattr(place, compute)
+    box_mesh().write(tmp_path / "box.vtu", unit="m")
+    trimesh.creation.box((0.08, 0.05, 0.05)).export(tmp_path / "box.stl")
+    sources = ('mesh = "box.vtu"\nunit = "m"', 'mesh = "box.stl"\nunit = "m"', f'store = "{block_green.path}"')
+    for number, source in enumerate(sources):
+        supports = "" if "store" in source else '[supports]\nfixed = "z < min + 1mm"\n'
+        (tmp_path / "a.toml").write_text(f"[body]\n{source}\n{supports}[tool]\nradius = 6\n")
+        line = (tmp_path / "a.toml").read_text().count("\n")
+        words = (f"a.toml:{line}: tool.radius is 6 m, more than the longest side of the bodies, 80 mm",)
+        refused(run("info", "a.toml", cwd=tmp_path), *words)
+        if number != 1:
+            refused(run("run", "a.toml", "--headless", "1", cwd=tmp_path), *words)
+    with pytest.raises(palpate.SceneError, match="radius is 6 m, more than the longest side"):
+        built_from(tmp_path / "box.vtu", RunOptions(radius="6m", unit="m"))
 
 
 def test_radii_that_are_not_given_follow_the_body(block_green):
