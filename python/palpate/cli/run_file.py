@@ -21,6 +21,7 @@ from palpate.cli.bodies import (
     segment_tables,
     units_of_size,
 )
+from palpate.cli.option_values import read_option, require_unit
 from palpate.errors import SceneError
 from palpate.segmentation.endings import is_segmentation
 
@@ -205,7 +206,7 @@ def _radii(tool: Any, radius: str) -> dict[str, float]:
 
     if "radius" not in KEYS.get(tool.shape, (set(),))[0]:
         raise SceneError(f"--radius: a tool of shape '{tool.shape}' has no radius")
-    value = length(radius)
+    value = read_option("--radius", radius, length)
     if not (np.isfinite(value) and value > 0):
         raise SceneError(f"--radius must be positive, got {radius}")
     return {"radius": value, "contact_radius": value} if tool.contact != "local" else {"radius": value}
@@ -230,6 +231,7 @@ def _bare(
     from palpate.scene.regions import DEFAULT_LAW
     from palpate.scene.series import with_stored_series
 
+    require_unit(options.unit)
     defaults = []
     unit = options.unit
     if unit is None and not is_segmentation(file):
@@ -253,7 +255,8 @@ def _bare(
     if options.poissons_ratio is None:
         defaults.append(f"Poisson's ratio {ratio} (--nu)")
     defaults.append(f"law {DEFAULT_LAW} (a scene may name another)")
-    material = Material(units.pressure(modulus), ratio, units.density(density), DEFAULT_LAW)
+    modulus, density = read_option("-E", modulus, units.pressure), read_option("--density", density, units.density)
+    material = Material(modulus, ratio, density, DEFAULT_LAW)
     segments = segment_tables(options.segment)
     tables = {"material": asdict(material), "supports": {"fixed": fix}}
     of_loop = {name: getattr(options, name) for name in OF_LOOP}

@@ -106,8 +106,8 @@ class Plan:
             f"{n / 1e9:.3g}" for n in (self.factor_flops, self.sweep_flops, self.surface_last_flops)
         )
         lines = (
-            f"{self.columns} columns of {self.rows} rows: factor {factor} Gflop, columns {sweeps} Gflop by sweeps "
-            f"(surface last: at least {other})\n"
+            f"{self.columns} columns of {self.rows} rows: {factor} Gflop for the factor, {sweeps} Gflop for the "
+            f"columns (with the surface ordered last at least {other} Gflop)\n"
             f"peak memory {self.memory / 1e9:.2f} GB, {self.tasks} tasks with {self.block} columns each, "
             f"store {self.store / 1e9:.3g} GB in {self.precision}\n"
             f"disk {self.disk / 1e9:.3g} GB at most of {self.disk_free / 1e9:.3g} GB free, "

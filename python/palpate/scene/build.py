@@ -142,7 +142,10 @@ def locating_errors(
         yield
     except Error as error:
         table = next(key for key in reversed(place) if isinstance(key, str))
-        message = f"{located(*scene.source, place)}: {table}: {error}"
+        text = str(error)
+        # What was asked for may have the name of its table.
+        text = text if text.startswith(f"{table}: ") else f"{table}: {text}"
+        message = f"{located(*scene.source, place)}: {text}"
         if isinstance(error, UnclearUnitError):
             raise UnclearUnitError(message, error.fitting) from None
         raise (kind or type(error))(message) from None
@@ -231,7 +234,7 @@ class _Builder:
     def require_files(self) -> float:
         """Look at what building would read; a surface that is yet to be filled only by itself.
 
-        Returns the longest side of the body, m; that of a segmentation is infinite, for it is not known yet.
+        Returns the longest side of the body, m; that of a segmentation is infinite: it is not known yet.
         """
         self._require_materials()
         table = self._table
