@@ -49,10 +49,25 @@ class Presses:
         self._scene = _to_press(scene, measured)
         self._reference = unknowns.slots[0].material.youngs_modulus
         self._known: dict[tuple[float, ...], Curves] = {}
-        self._folder = tempfile.TemporaryDirectory(prefix="palpate-fit-")
         self._mesh = mesh_of_body(self._scene)
+        self._require_depths()
+        self._folder = tempfile.TemporaryDirectory(prefix="palpate-fit-")
         self.points = self.normals = np.empty((0, 3))
         self.solved = 0
+
+    def _require_depths(self) -> None:
+        """Refuse depths beyond the tool or the body: their unit is another one."""
+        depths, tool = self._measured.depth, self._scene.tools[0]
+        deepest = int(depths.argmax())
+        longest = float(np.ptp(self._mesh.nodes, axis=0).max())
+        limits = {"the tool, whose radius is": tool.reach, "the body, whose longest side is": longest}
+        for what, limit in limits.items():
+            if 0 < limit < depths[deepest]:
+                name = self._measured.names[self._measured.curve[deepest]]
+                raise FitError(
+                    f"{name}: a depth of {1e3 * depths[deepest]:.4g} mm is beyond {what} {1e3 * limit:.4g} mm: are the "
+                    "depths in another unit (--depth-unit)?"
+                )
 
     @property
     def has_pad(self) -> bool:
