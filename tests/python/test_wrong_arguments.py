@@ -119,8 +119,8 @@ def test_depths_of_a_fit_in_another_unit_and_a_single_key_that_is_held(block, tm
         supports={"fixed": "x < 1mm"},
         tool={"radius": "6mm"},
     )
-    words = r"curve 1: a depth of .* mm is beyond the tool, whose radius is 6 mm: .* \(--depth-unit\)"
-    for factor in (1e3, 2.0):
+    words = r"curve 1: a depth of .* mm is beyond ten radii of the tool, which are 60 mm: .* \(--depth-unit\)"
+    for factor in (1e3, 13.0):
         refused(palpate.FitError, words, palpate.fit, scene, palpate.Indentations(FORCE, factor * DEPTH))
     sheet = {"shape": "punch", "radius": "6mm"}
     punched = scene.model_copy(update={"tools": palpate.Scene(body={"model": "beam"}, tool=sheet).tools})

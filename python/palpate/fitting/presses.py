@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 DEPTHS = 90
 # Computed presses go deeper than measured ones by this factor, for the touch may have been earlier.
 DEEPER = 1.15
+# Of the tool's radius: the law of a contact ends at two, rows beyond it are left out, and so many are in another unit.
+MOST_RADII = 10.0
 # A place farther from the surface than this part of the tool's size is none.
 FAR = 1.0
 
@@ -56,11 +58,14 @@ class Presses:
         self.solved = 0
 
     def _require_depths(self) -> None:
-        """Refuse depths beyond the tool or the body: their unit is another one."""
+        """Refuse depths far beyond the tool, or beyond the body: their unit is another one."""
         depths, tool = self._measured.depth, self._scene.tools[0]
         deepest = int(depths.argmax())
         longest = float(np.ptp(self._mesh.nodes, axis=0).max())
-        limits = {"the tool, whose radius is": tool.reach, "the body, whose longest side is": longest}
+        limits = {
+            "ten radii of the tool, which are": MOST_RADII * tool.reach,
+            "the body, whose longest side is": longest,
+        }
         for what, limit in limits.items():
             if 0 < limit < depths[deepest]:
                 name = self._measured.names[self._measured.curve[deepest]]
