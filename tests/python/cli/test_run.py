@@ -30,7 +30,8 @@ def test_a_bare_surface_runs_with_defaults_that_are_told(tmp_path):
     shutil.copy(BLOCK, tmp_path)
     result = run("run", "block.obj", "--headless", "1", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
-    computed, text, *_ = result.stdout.splitlines()
+    computed, series, text, *_ = result.stdout.splitlines()
+    assert series.startswith("series beyond small strain below spheres of 5 mm")
     # The size is printed before it is written.
     assert computed.startswith("computing 2526 columns: at most 51 MB in the cache")
     assert computed.endswith(", 842 on the surface)")
@@ -39,6 +40,7 @@ def test_a_bare_surface_runs_with_defaults_that_are_told(tmp_path):
         "unit mm (--unit; it may also be cm or in)",
         "z < min + 0.25mm (--fix)",
         "E = 10kPa (-E)",
+        "law neo-hookean",
         "0.45 (--nu)",
     ):
         assert word in text
@@ -74,7 +76,8 @@ def test_the_size_of_a_scene_is_printed_before_it_is_computed(capsys, monkeypatc
 def test_options_of_a_bare_surface_are_those_of_a_scene(capsys, tmp_path):
     options = RunOptions("8mm", "z < min + 1mm", "20kPa", 0.4, "900kg/m3", "mm", "2cm")
     built = built_from(BLOCK, options)
-    assert "by default" not in capsys.readouterr().out
+    # No option chooses it.
+    assert capsys.readouterr().out.endswith("; by default law neo-hookean (a scene may name another)\n")
     (tmp_path / "a.toml").write_text(
         f'[body]\nmesh = "{BLOCK}"\nunit = "mm"\nmax_element_size = "2cm"\n[supports]\nfixed = "z < min + 1mm"\n'
         '[material]\nyoungs_modulus = "20kPa"\npoissons_ratio = 0.4\ndensity = 900\n[tool]\nradius = "8mm"\n'
