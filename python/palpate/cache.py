@@ -86,6 +86,8 @@ def _description(file: Path, leftover: bool) -> str:
         return "not a store"
     if made_of.get("format") == "palpate-contact":
         return "what a tool needs to know of the body with the same beginning"
+    if file.name.endswith(".series.palpate"):
+        return "series beyond small strain of the store with the same beginning"
     kind = "modes" if file.name.endswith(".modes.palpate") else f"Green's function, {made_of.get('precision', '')}"
     try:
         about = json.loads(made_of.get("description") or "{}")

@@ -65,6 +65,11 @@ def brief_repr(value: object) -> str:
     return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}..."
 
 
+def count_text(count: int, one: str, several: str | None = None) -> str:
+    """Write a number with its noun, such as ``1 tool`` and ``2 tools``."""
+    return f"{count} {one}" if count == 1 else f"{count} {several or one + 's'}"
+
+
 def _reader(units: dict[str, float], kind: str, doc: str) -> Callable[[str | float], float]:
     """Make the reader of one kind of quantity."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Iterable, Sequence
 from numbers import Real
 from typing import Any
@@ -44,6 +45,16 @@ def three_components(
     if not all(v is None or np.isfinite(v) for v in (x, y, z)):
         raise error(f"{what} has a number that is not finite")
     return x, y, z
+
+
+def number_array(values: Any, what: str, error: type[Error]) -> np.ndarray:
+    """Take values as an array of real numbers, or raise ``error``; ``what`` names them in messages."""
+    # Numbers that do not fit into one array are no array of numbers.
+    with contextlib.suppress(TypeError, ValueError, OverflowError):
+        array = np.asarray(values)
+        if array.dtype.kind in "biufO":
+            return np.ascontiguousarray(array, dtype=np.float64)
+    raise error(f"{what} must be an array of real numbers, got {brief_repr(values)}")
 
 
 def number(value: Any, what: str, error: type[Error]) -> float:

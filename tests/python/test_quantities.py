@@ -7,6 +7,7 @@ import pytest
 from conftest import box_mesh
 
 import palpate
+from palpate.units import count_text
 
 TOP = (0.04, 0.025, 0.05)
 
@@ -61,6 +62,11 @@ def test_values_of_a_wrong_kind_are_refused_by_name(call, message, block_green):
     with pytest.raises(palpate.Error, match=message) as raised:
         call(block_green)
     assert "\n" not in str(raised.value)
+
+
+def test_a_single_thing_is_one():
+    assert [count_text(n, "tool") for n in (0, 1, 2)] == ["0 tools", "1 tool", "2 tools"]
+    assert [count_text(n, "body", "bodies") for n in (1, 3)] == ["1 body", "3 bodies"]
 
 
 def test_settings_of_a_running_loop_take_units_and_refuse_the_rest(block, block_green):

@@ -112,7 +112,7 @@ export class Viewer {
   }
 
   start(): void {
-    showHint();
+    showHint(this.store);
     fillHelp();
     this.connection.open();
   }

@@ -6,11 +6,12 @@ import signal
 import sys
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from palpate.cli.bodies import (
+    Element,
     MaxSize,
     MaxVolumeLoss,
     MesherChoice,
@@ -22,6 +23,8 @@ from palpate.cli.bodies import (
     is_surface,
 )
 from palpate.cli.completion import units
+from palpate.cli.option_values import read_option, require_unit
+from palpate.cli.scene_lines import print_scene
 from palpate.cli.store_lines import green_line, precision_line
 from palpate.segmentation.endings import is_segmentation
 from palpate.startup import restore_interrupts
@@ -130,7 +133,8 @@ def mesh(
     from palpate.units import length
 
     require_writable(out, MeshError)
-    size, element = None if max_size is None else length(max_size), "quadratic" if quadratic else "linear"
+    size = None if max_size is None else read_option("--max-size", max_size, length)
+    element: Element = "quadratic" if quadratic else "linear"
     fill = fill_options(mesher, part, max_volume_loss, segment)
     volume_mesh = in_unit(unit, lambda unit: tetrahedralize_with(element, surface, size, unit, options=fill))
     volume_mesh.write(out)
@@ -154,17 +158,24 @@ def touch(
     """
     import numpy as np
 
+    from palpate.cli.checks import require_store
+    from palpate.errors import BodyError
     from palpate.fields import STRAIN_LIMIT
     from palpate.green import GreensFunction, error_text
     from palpate.mesh import size_text
     from palpate.scene.default_radius import default_contact_radius
     from palpate.units import length
 
+    require_store(store)
     green = GreensFunction.load(store)
-    where = [length(v) for v in point.split(",")]
-    how = [None if v.strip() == "-" else length(v) for v in press.split(",")]
-    reach = default_contact_radius(green) if radius is None else length(radius)
-    answer = green.touch(where, how, reach)
+    where = [read_option("--point", v, length) for v in point.split(",")]
+    how = [None if v.strip() == "-" else read_option("--press", v, length) for v in press.split(",")]
+    reach = default_contact_radius(green) if radius is None else read_option("--radius", radius, length)
+    try:
+        answer = green.touch(where, how, reach)
+    except BodyError as error:
+        # Programs may take the closest point, however far.
+        raise BodyError(str(error).partition("; on_surface=")[0]) from None
     if answer.distance > 1e-6 * green.extents.max():
         print(f"landed at {np.array2string(answer.point, precision=5)} m, {size_text([answer.distance])} off the point")
     size = np.linalg.norm(answer.displacements, axis=1)
@@ -191,12 +202,14 @@ def info(
 
     Example: palpate info liver.palpate
     """
+    from palpate.cli.checks import require_body
     from palpate.dynamics import ModalBasis
     from palpate.green import GreensFunction
     from palpate.green.series import lines_of_series, series_line
     from palpate.mesh import TetMesh
-    from palpate.scene import Scene
 
+    require_body(file)
+    require_unit(unit)
     if file.name.endswith(".modes.palpate"):
         basis = ModalBasis.load(file)
         print(f"{file}: {len(basis)} modes, {basis.frequencies[0]:.4g} to {basis.frequencies[-1]:.4g} Hz")
@@ -214,18 +227,7 @@ def info(
             print(f"  {line}")
         return
     if file.suffix == ".toml":
-        scene = Scene.read(file)
-        scene.require_files()
-        print(f"{file}: scene of {scene.name}")
-        entries = scene.model_dump(by_alias=True, exclude_none=True)
-        for owner, entry in zip([scene, *scene.bodies], [entries, *entries["body"]], strict=True):
-            if owner.material is not None:  # the modulus may be that of the law's constants
-                entry["material"]["youngs_modulus"] = owner.material.material().youngs_modulus
-        for name, value in entries.items():
-            _print_entry(name, value)
-        if any(tool.radius is None or tool.contact_radius is None for tool in scene.tools):
-            print("  radii of tools that are not given: a sixteenth of the longest side of the body")
-        print("  lengths in m, pressures in Pa, forces in N, times in s")
+        print_scene(file)
         return
     if is_segmentation(file):
         from palpate.cli.segmentations import print_segmentation
@@ -245,18 +247,6 @@ def info(
     print(
         f"  regions: {sorted(set(tets.regions.tolist()))}, dihedral angle >= {tets.dihedral_angles().min():.1f} degrees"
     )
-
-
-def _print_entry(name: str, value: Any) -> None:
-    """Print the keys under a name of a scene, those of several tables with their number."""
-    if isinstance(value, dict):
-        for key, inner in value.items():
-            _print_entry(f"{name}.{key}", inner)
-    elif isinstance(value, list) and value and isinstance(value[0], dict):
-        for rank, entry in enumerate(value):
-            _print_entry(name if len(value) == 1 else f"{name}[{rank}]", entry)
-    elif value != []:
-        print(f"  {name} = {value}")
 
 
 @app.command("models")

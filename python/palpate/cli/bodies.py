@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from palpate.cli.completion import units
+from palpate.cli.option_values import read_option, require_unit
 from palpate.segmentation.endings import is_segmentation
 
 if TYPE_CHECKING:
@@ -110,7 +111,7 @@ def segment_tables(typed: Sequence[str] | None) -> list[dict[str, str]]:
         if not sign:
             tables.append({"name": text})
             continue
-        if not pressure(modulus) > 0:
+        if not read_option(f"--segment {text}", modulus, pressure) > 0:
             raise UnitError(f"--segment {text}: a Young's modulus is positive")
         tables.append({"name": name, "youngs_modulus": modulus})
     return tables
@@ -168,7 +169,7 @@ def read_any(
     from palpate.units import length
 
     if is_surface(path) or is_segmentation(path):
-        size = None if max_size is None else length(max_size)
+        size = None if max_size is None else read_option("--max-size", max_size, length)
         chosen = element or "quadratic"
         return tetrahedralize_with(chosen, path, size, unit, options=fill, progress=progress, drawn=drawn)
     if max_size is not None or fill not in (None, FillOptions()):
@@ -232,6 +233,7 @@ def in_unit(unit: str | None, read: Callable[[str | None], TetMesh]) -> TetMesh:
     """Read a file in its unit of length, asking for it on a terminal where it is not clear."""
     from palpate.errors import UnclearUnitError
 
+    require_unit(unit)
     try:
         return read(unit)
     except UnclearUnitError as error:

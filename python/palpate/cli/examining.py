@@ -53,9 +53,11 @@ def nodule(
 
     Example: palpate exam nodule --observer 0.1 --exams 200
     """
+    from palpate.cli.checks import require_places
     from palpate.exam import ExamFile, Library
     from palpate.progress import status_line
 
+    require_places(None, out, (host, port) if observer is None else None)
     found = ExamFile.default() if file is None else ExamFile.read(file)
     chosen = found.question.seed if seed is None else seed
     with status_line(f"preparing {found.title}"):

@@ -24,6 +24,7 @@ from palpate.cli.bodies import (
     ToolRadius,
     YoungsModulus,
 )
+from palpate.cli.option_values import read_option
 
 if TYPE_CHECKING:
     from palpate.palpation import Detection, StiffnessMap
@@ -75,6 +76,7 @@ def map_command(
 
     Example: palpate map liver --grid 15mm --depth 2mm --strokes
     """
+    from palpate.cli.checks import require_folder
     from palpate.cli.run_file import RunOptions
 
     length, quickness = _quantities()
@@ -82,8 +84,9 @@ def map_command(
     material = {"youngs_modulus": youngs_modulus, "poissons_ratio": poissons_ratio}
     of_file = {"unit": unit, "max_size": max_size, "element": element, "mesher": mesher, "part": part}
     of_file |= {"max_volume_loss": max_volume_loss, "segment": tuple(segment) if segment else None}
-    built = _build_scene(file, RunOptions(radius=radius, fix=fix, **material, **of_file))
     folder = out if out is not None else Path(f"{file.stem}-palpation")
+    require_folder(folder)
+    built = _build_scene(file, RunOptions(radius=radius, fix=fix, **material, **of_file))
     with _folder(folder):
         found, detection, written = _palpate(built, folder, given, on, strokes, against)
     _print_result(found, detection, folder, written)
@@ -96,10 +99,7 @@ def _quantities() -> tuple[Callable[[str, str], float], Callable[[str, str], flo
 
     def reader(read: Callable[[str], float]) -> Callable[[str, str], float]:
         def named(option: str, text: str) -> float:
-            try:
-                value = read(text)
-            except UnitError as error:
-                raise UnitError(f"{option}: {error}") from None
+            value = read_option(option, text, read)
             if not 0 < value < float("inf"):
                 raise UnitError(f"{option} must be positive, got {text}")
             return value
@@ -111,16 +111,17 @@ def _quantities() -> tuple[Callable[[str, str], float], Callable[[str, str], flo
 
 def _build_scene(file: Path, options: Any) -> BuiltScene:
     """Scene of a file, or of a built-in model by its name."""
+    from palpate.cli.checks import no_such_model, require_body
     from palpate.cli.run_file import built_from, scene_with
-    from palpate.errors import SceneError
     from palpate.models import NAMES
     from palpate.progress import status_line
     from palpate.scene import model_scene
 
     if file.exists() or file.suffix:
+        require_body(file)
         return built_from(file, options)
     if str(file) not in NAMES:
-        raise SceneError(f"{file}: no such file, and no model of that name; models are {', '.join(NAMES)}")
+        raise no_such_model(str(file))
     options.refuse(file, {"radius", "fix", "youngs_modulus", "poissons_ratio"}, "a model has its own mesh")
     with status_line(f"preparing {file}"):
         return scene_with(model_scene(str(file)), options).build()
@@ -131,8 +132,6 @@ def _folder(folder: Path) -> Any:
     """Make a folder, and take it away again if nothing was put into it."""
     from palpate.errors import Error
 
-    if folder.exists() and not folder.is_dir():
-        raise Error(f"{folder} is a file: --out names a folder")
     folder.mkdir(parents=True, exist_ok=True)
     try:
         yield
@@ -165,7 +164,7 @@ def _palpate(
             detection = compare(found, other, partial=folder / PLAIN_PARTIAL, progress=True)
     except KeyboardInterrupt:
         print(
-            f"palpate: interrupted; finished presses are kept in {folder}, and the same command continues",
+            f"palpate: finished presses are kept in {folder}, and the same command continues",
             file=sys.stderr,
         )
         raise typer.Exit(130) from None
@@ -185,16 +184,19 @@ def _print_result(found: StiffnessMap, detection: Detection | None, folder: Path
     """Say what was found, what was left out, and what held the tool."""
     import numpy as np
 
+    from palpate.units import count_text
+
     left_out = ", ".join(f"{count} {reason}" for reason, count in found.skipped.items())
-    strokes = f" on {found.strokes.max() + 1} strokes" if found.strokes.max() >= 0 else ""
-    print(f"{len(found.points)} points{strokes}" + (f"; left out: {left_out}" if left_out else ""))
+    strokes = f" on {count_text(found.strokes.max() + 1, 'stroke')}" if found.strokes.max() >= 0 else ""
+    print(f"{count_text(len(found.points), 'point')}{strokes}" + (f"; left out: {left_out}" if left_out else ""))
     low, high = int(np.nanargmin(found.stiffness)), int(np.nanargmax(found.stiffness))
     places = ", ".join(f"{found.stiffness[k]:.4g} N/m at {_millimetres(found.points[k])}" for k in (low, high))
     print(f"stiffness at {1e3 * found.depth:.3g} mm: from {places}; median {np.nanmedian(found.stiffness):.4g} N/m")
     for reason in dict.fromkeys(found.held_by[found.held_by != ""]):
         held = found.held_by == reason
         reached = f" from {1e3 * np.nanmin(found.reached_depth[held]):.2g} mm on" if "limit" in reason else ""
-        print(f"palpate: note: {held.sum()} points have no stiffness ({reason}{reached})", file=sys.stderr)
+        points = count_text(held.sum(), "point has", "points have")
+        print(f"palpate: note: {points} no stiffness ({reason}{reached})", file=sys.stderr)
     for nodule in detection.nodules if detection is not None else ():
         change = f"{100 * abs(nodule.ratio - 1):.1f} % {'stiffer' if nodule.ratio > 1 else 'softer'}"
         print(f"nodule under {_millimetres(nodule.place)}: {change}, half of it {1e3 * nodule.half_width:.2g} mm away")

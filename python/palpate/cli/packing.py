@@ -20,9 +20,11 @@ def pack(
     Example: palpate pack scene.toml liver.pack
     """
     from palpate import simulation
-    from palpate.scene import Scene
+    from palpate.cli.checks import scene_of_file
+    from palpate.units import count_text
 
-    read = Scene.of_store(scene) if scene.suffix == ".palpate" else Scene.read(scene)
+    read = scene_of_file(scene)
     simulation.pack(read, out)
     size = sum(file.stat().st_size for file in out.iterdir())
-    print(f"{out}: {len(read.bodies)} bodies, {len(read.tools)} tools, {size / 1e6:.1f} MB")
+    counts = f"{count_text(len(read.bodies), 'body', 'bodies')}, {count_text(len(read.tools), 'tool')}"
+    print(f"{out}: {counts}, {size / 1e6:.1f} MB")

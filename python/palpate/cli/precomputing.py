@@ -25,6 +25,7 @@ from palpate.cli.bodies import (
     read_any,
 )
 from palpate.cli.completion import precisions
+from palpate.cli.option_values import read_option
 from palpate.cli.store_lines import green_line, precision_line
 
 if TYPE_CHECKING:
@@ -86,6 +87,7 @@ def precompute(
     """
     from palpate import units
     from palpate.body import Loads, Material, surface_region
+    from palpate.cli.checks import require_body, require_store_name
     from palpate.errors import SceneError, StoreError
     from palpate.green import plan, precompute
     from palpate.input_file import require_writable
@@ -93,12 +95,16 @@ def precompute(
     if file.suffix == ".toml":
         _precompute_scene(context, file, dask)
         return
+    require_body(file)
     if fix is None:
         raise SceneError(f"{file}: --fix is missing: the nodes that are held, such as --fix 'z < min + 5mm'")
     if out is not None:
+        require_store_name(out)
         require_writable(out, StoreError)
-    material = Material(units.pressure(youngs_modulus), poissons_ratio, units.density(density))
-    loads = None if gravity is None else Loads(gravity=[units.acceleration(g) for g in gravity.split(",")])
+    modulus, mass = read_option("-E", youngs_modulus, units.pressure), read_option("--density", density, units.density)
+    material = Material(modulus, poissons_ratio, mass)
+    parts = () if gravity is None else gravity.split(",")
+    loads = Loads(gravity=[read_option("--gravity", g, units.acceleration) for g in parts]) if parts else None
     fill = fill_options(mesher, part, max_volume_loss, segment)
     with cluster(dask) as workers:
         volume_mesh = in_unit(unit, lambda unit: read_any(file, unit, element, max_size, fill))

@@ -21,6 +21,7 @@ from palpate.cli.bodies import (
     segment_tables,
     units_of_size,
 )
+from palpate.cli.option_values import read_option, require_unit
 from palpate.errors import SceneError
 from palpate.segmentation.endings import is_segmentation
 
@@ -205,7 +206,7 @@ def _radii(tool: Any, radius: str) -> dict[str, float]:
 
     if "radius" not in KEYS.get(tool.shape, (set(),))[0]:
         raise SceneError(f"--radius: a tool of shape '{tool.shape}' has no radius")
-    value = length(radius)
+    value = read_option("--radius", radius, length)
     if not (np.isfinite(value) and value > 0):
         raise SceneError(f"--radius must be positive, got {radius}")
     return {"radius": value, "contact_radius": value} if tool.contact != "local" else {"radius": value}
@@ -225,8 +226,12 @@ def _bare(
     from palpate.mesh import size_text
     from palpate.scene import BuiltScene, Scene
     from palpate.scene.build import marked_as_growing
+    from palpate.scene.default_radius import require_tool_sizes
+    from palpate.scene.early import pressing_radii
+    from palpate.scene.regions import DEFAULT_LAW
     from palpate.scene.series import with_stored_series
 
+    require_unit(options.unit)
     defaults = []
     unit = options.unit
     if unit is None and not is_segmentation(file):
@@ -249,15 +254,18 @@ def _bare(
         defaults.append(f"E = {modulus} (-E)")
     if options.poissons_ratio is None:
         defaults.append(f"Poisson's ratio {ratio} (--nu)")
-    material = Material(units.pressure(modulus), ratio, units.density(density))
+    defaults.append(f"law {DEFAULT_LAW} (a scene may name another)")
+    modulus, density = read_option("-E", modulus, units.pressure), read_option("--density", density, units.density)
+    material = Material(modulus, ratio, density, DEFAULT_LAW)
     segments = segment_tables(options.segment)
     tables = {"material": asdict(material), "supports": {"fixed": fix}}
-    scene = Scene(body={"mesh": str(file), "unit": unit, "segment": segments}, **tables)
-    body = body_of(mesh, materials_of(mesh, material, options.segment), fix)
-    green = _green(body, growing, progress)
     of_loop = {name: getattr(options, name) for name in OF_LOOP}
     of_run = RunOptions(radius=options.radius, **of_loop)
-    built = BuiltScene.of(scene_with(scene, of_run), body, green)
+    scene = scene_with(Scene(body={"mesh": str(file), "unit": unit, "segment": segments}, **tables), of_run)
+    body = body_of(mesh, materials_of(mesh, material, options.segment), fix)
+    require_tool_sizes(scene, float((high - low).max()))
+    green = _green(body, pressing_radii(scene, body), growing, progress)
+    built = BuiltScene.of(scene, body, green)
     built = with_stored_series(marked_as_growing(built, growing or {}))
     if options.radius is None:
         defaults.append(f"tool of radius {1e3 * built.scene.tools[0].radius:.3g} mm (--radius)")
@@ -271,7 +279,9 @@ def print_expected(expected: Expected) -> None:
         print(expected, flush=True)
 
 
-def _green(body: Body, growing: dict[int, BackgroundPrecompute] | None, progress: bool | Reporter) -> GreensFunction:
+def _green(
+    body: Body, radii: Sequence[float], growing: dict[int, BackgroundPrecompute] | None, progress: bool | Reporter
+) -> GreensFunction:
     """Compute what touches need: at first only where the page shows the middle, if the whole takes long."""
     from palpate.green import BackgroundPrecompute, precompute
     from palpate.mesh import shapes
@@ -280,7 +290,7 @@ def _green(body: Body, growing: dict[int, BackgroundPrecompute] | None, progress
 
     if isinstance(progress, Reporter):
         progress.phase("planning")
-    expected = Expected.of(body)
+    expected = Expected.of(body, radii=radii)
     print_expected(expected)
     if growing is None or expected.first is None:
         return precompute(body, progress=progress)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -26,6 +27,7 @@ from palpate.cli.bodies import (
 )
 from palpate.cli.completion import devices, models
 from palpate.cli.linking import Igtl, IgtlAxes, IgtlFrom, IgtlHost, LinkOptions, linked
+from palpate.cli.option_values import finite
 
 if TYPE_CHECKING:
     import numpy as np
@@ -38,7 +40,8 @@ if TYPE_CHECKING:
     from palpate.viewer.preparing import Prepared
 
 Headless = Annotated[
-    float | None, typer.Option(min=0.1, help="Press by a script for this many seconds at 1 kHz, without a page.")
+    float | None,
+    typer.Option(min=0.1, callback=finite, help="Press by a script for this many seconds at 1 kHz, without a page."),
 ]
 Out = Annotated[Path, typer.Option(help="Folder for the log (CSV) and the plot (PNG) of --headless.")]
 Port = Annotated[int, typer.Option(min=0, max=65535, help="Port of the page; 0 takes a free one.")]
@@ -92,6 +95,7 @@ def demo(
 
     Example: palpate demo beam --impulse --paper --out results
     """
+    from palpate.cli.checks import require_places
     from palpate.cli.impulse import SECONDS, impulse_history, impulse_scene
     from palpate.models import NAMES
     from palpate.scene import model_scene
@@ -99,6 +103,7 @@ def demo(
     def scene_of(name: str) -> Scene:
         return impulse_scene(name, paper) if impulse else model_scene(name, paper, motion)
 
+    require_places(record, out, None if headless is not None or (impulse and out is not None) else (host, port))
     if impulse and (headless is not None or out is not None):
         impulse_history(model, paper, headless or SECONDS, out or Path())
         return
@@ -172,6 +177,7 @@ def run(
 
     Without a FILE the page is empty: drop a surface on it, and set the body up there.
     """
+    from palpate.cli.checks import require_body, require_places
     from palpate.cli.run_file import RunOptions, built_from
 
     page = _Page(host, port, browser, recordings, LinkOptions(igtl, igtl_host, igtl_axes, igtl_from))
@@ -192,6 +198,8 @@ def run(
     if headless is not None:
         if surface_map is not None:
             raise typer.BadParameter("--map is shown in the page: leave out --headless")
+        require_body(file)
+        require_places(record, out)
         built = built_from(file, options)
         _print_cache_use()
         _print_loose(built)
@@ -236,8 +244,9 @@ def _view(
 
 def _view_early(file: Path, options: RunOptions, page: _Page, record: Path | None, surface_map: Path | None) -> None:
     """Open the page at once, and prepare what is touched while it shows the surface and the stages."""
+    from palpate.cli.checks import require_body, require_places
     from palpate.cli.run_file import built_from, surface_of
-    from palpate.errors import SceneError
+    from palpate.errors import ViewerError
     from palpate.input_file import require_file
     from palpate.progress import progress_reporter, reported_to
     from palpate.viewer.live import open_viewer
@@ -245,7 +254,10 @@ def _view_early(file: Path, options: RunOptions, page: _Page, record: Path | Non
     from palpate.viewer.server import ViewerServer
     from palpate.viewer.surface_map import read_map
 
-    require_file(file, SceneError)
+    require_body(file)
+    require_places(record, None, (page.host, page.port))
+    if surface_map is not None:
+        require_file(surface_map, ViewerError)
     page.recordings.mkdir(parents=True, exist_ok=True)
     files = {"record": record, "recordings": page.recordings}
     server = ViewerServer(PreparingSession(), host=page.host, port=page.port, **files)
@@ -335,7 +347,7 @@ def _scripted(built: BuiltScene, name: str, seconds: float, out: Path, recording
         print(f"{title:9s} {row['p50']:7.1f}  {row['p99']:7.1f}  {row['p999']:7.1f}  {row['max']:7.1f}")
     print(f"missed deadlines: {statistics['missed_deadlines']}; wrote {out / name}.csv and .png")
     if recording is not None:
-        print(f"recorded {recording}: 'palpate replay {recording}' computes it again")
+        print(f"recorded {recording}: to compute it again: palpate replay {shlex.quote(str(recording))}")
     priority, locked_memory = statistics["realtime"]
     if not (locked_memory and (priority or built.scene.device.priority == 0)):
         print(
@@ -343,7 +355,6 @@ def _scripted(built: BuiltScene, name: str, seconds: float, out: Path, recording
             file=sys.stderr,
         )
     if record.interrupted:
-        print("palpate: interrupted", file=sys.stderr)
         raise typer.Exit(130)
     if statistics["fault"] is not None:
         print(f"palpate: {statistics['fault']}", file=sys.stderr)

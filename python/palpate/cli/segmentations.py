@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 
 
@@ -17,4 +18,4 @@ def print_segmentation(path: Path, unit: str | None) -> None:
         volume = f"{1e6 * segment.voxels * labels.voxel_volume:.4g} cm3, {segment.voxels:,} voxels"
         print(f"  '{segment.name}' (label {segment.value}): {volume if segment.voxels else 'empty'}")
     largest = max(labels.segments, key=lambda segment: segment.voxels)
-    print(f"  to touch it: palpate run {path} --segment '{largest.name}'")
+    print(f"  to touch it: palpate run {shlex.quote(str(path))} --segment {shlex.quote(str(largest.name))}")

@@ -12,6 +12,7 @@ import typer
 
 from palpate.cli.app import app
 from palpate.cli.completion import formats
+from palpate.cli.option_values import read_option
 
 if TYPE_CHECKING:
     from palpate.sessions import Comparison, QuantityDifference
@@ -52,7 +53,8 @@ def export(
 
     target = _target(file, to, out)
     recording = _loaded(file)
-    span = {"start": time(start), "end": None if end is None else time(end)}
+    span = {"start": read_option("--from", start, time)}
+    span["end"] = None if end is None else read_option("--until", end, time)
     same = None if scene is None else Scene.read(scene)
     for written in sessions.export(recording, target, rate=rate, scene=same, progress=True, **span):
         print(written)
@@ -93,11 +95,14 @@ def compare(
 
     Example: palpate compare press.mcap --scene stiffer.toml
     """
+    from palpate.cli.checks import require_folder
     from palpate.errors import Error
     from palpate.sessions import compare as compared
 
     if (b is None) == (scene is None):
         raise Error("compare takes two recordings, or one and --scene")
+    if out is not None:
+        require_folder(out)
     first = _loaded(a)
     if b is not None:
         second, name = _loaded(b), b.name
@@ -105,7 +110,7 @@ def compare(
         second, name = _rerun(first, scene), scene.name
     found = compared(first, second)
     if as_json:
-        print(json.dumps(_as_json(found), indent=2))
+        print(json.dumps(_as_json(found), indent=2, ensure_ascii=False))
     else:
         _print(found, (a.name, name))
     if out is not None:
@@ -190,7 +195,7 @@ def _cells(row: QuantityDifference) -> tuple[str, ...]:
 
 
 def _text_of(value: object) -> str:
-    return "nothing" if value is None else str(value)
+    return "not given" if value is None else str(value)
 
 
 def _as_json(found: Comparison) -> dict:

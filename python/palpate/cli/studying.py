@@ -31,15 +31,17 @@ def study(
     Example: palpate study patients.toml --out patients --dask tcp://10.0.0.1:8786
     """
     from palpate.cli.bodies import cluster
+    from palpate.cli.checks import require_folder
     from palpate.study import Study
 
-    read = Study.read(file)
     folder = out if out is not None else Path(f"{file.stem}-study")
+    require_folder(folder)
+    read = Study.read(file)
     with cluster(dask) as workers:
         try:
             result = read.run(folder, dask=workers)
         except KeyboardInterrupt:
-            text = f"palpate: interrupted; finished bodies are kept in {folder}, and the same command continues"
+            text = f"palpate: finished bodies are kept in {folder}, and the same command continues"
             print(text, file=sys.stderr)
             raise typer.Exit(130) from None
     _print_result(result, folder)
@@ -49,9 +51,11 @@ def _print_result(result: StudyResult, folder: Path) -> None:
     """Write the results, and say what was found and what could not be."""
     import numpy as np
 
+    from palpate.units import count_text
+
     cases = len(np.unique(result.columns["case"]))
     known = f", {result.resumed} of them known before" if result.resumed else ""
-    print(f"{cases} bodies{known}; varied: {', '.join(result.varied) or 'nothing'}")
+    print(f"{count_text(cases, 'body', 'bodies')}{known}; varied: {', '.join(result.varied) or 'nothing'}")
     stiffness = result.columns.get("stiffness_N_per_m", np.empty(0))
     if np.isfinite(stiffness).any():
         low, high = np.nanmin(stiffness), np.nanmax(stiffness)

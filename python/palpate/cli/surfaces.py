@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -38,4 +39,5 @@ def print_surface(path: Path, unit: str | None) -> None:
         print(f"  closed, volume {1e6 * scale**3 * abs(shape.volume):.4g} cm3")
     if shape.body_count != 1:
         print(f"  {shape.body_count} separate surfaces: of several parts the largest is filled (--part)")
-    print(f"  to tetrahedra: palpate mesh {path} {path.with_suffix('.vtu')} --unit {unit}")
+    files = shlex.join([str(path), str(path.with_suffix(".vtu"))])
+    print(f"  to tetrahedra: palpate mesh {files} --unit {unit}")

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from palpate.cli.app import app
-
-if TYPE_CHECKING:
-    from palpate.scene import Scene
 
 
 @app.command()
@@ -31,9 +29,10 @@ def web(
 
     Example: palpate web liver scene.toml site, then python -m http.server -d site
     """
+    from palpate.cli.checks import scene_of_name
     from palpate.viewer.site import with_precision, write_site
 
-    read = {given: _scene(given) for given in scenes}
+    read = {given: scene_of_name(given) for given in scenes}
     chosen = read if precision is None else {given: with_precision(scene, precision) for given, scene in read.items()}
     built = [(Path(given).stem, scene.build()) for given, scene in chosen.items()]
     sizes = write_site(built, out)
@@ -41,15 +40,4 @@ def web(
         error = max(body.green._core.typical_errors[0] for body in scene.bodies)
         print(f"{name}: {size / 1e6:.1f} MB, forces right to {100 * error:.2g} %")
     print(f"{out}: program {sizes.program / 1e6:.1f} MB, in all {sizes.total / 1e6:.1f} MB")
-    print(f"python -m http.server -d {out}")
-
-
-def _scene(given: str) -> Scene:
-    """Scene of a file, a store, or a built-in model."""
-    from palpate import models
-    from palpate.scene import Scene, model_scene
-
-    path = Path(given)
-    if given in models.NAMES and not path.exists():
-        return model_scene(given)
-    return Scene.of_store(path) if path.suffix == ".palpate" else Scene.read(path)
+    print(f"python -m http.server -d {shlex.quote(str(out))}")

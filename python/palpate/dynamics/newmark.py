@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from palpate import _native
+from palpate import _native, units
 from palpate.body import Body
 from palpate.dynamics.basis import ModalBasis, basis_key
 from palpate.dynamics.basis import modes as compute_modes
@@ -14,7 +14,8 @@ from palpate.dynamics.energy import Energy
 from palpate.dynamics.matrices import Matrices, native
 from palpate.dynamics.residual import Residual
 from palpate.errors import BodyError
-from palpate.vectors import three_numbers
+from palpate.units import brief_repr
+from palpate.vectors import number, number_array, three_numbers
 
 METHODS = ("modal", "sparse", "dense", "exponential")
 
@@ -29,7 +30,7 @@ class Newmark:
     body
         With or without supports.
     dt
-        Time step, s.
+        Time step, s, or text such as ``"1ms"``.
     alpha, delta
         Weights of the new acceleration in displacement and velocity: (1/4, 1/2) keeps energy, (0, 1/2) is the central
         difference method, (0.3025, 0.6) damps motions that are too fast for the step. Not used by ``"exponential"``.
@@ -54,13 +55,15 @@ class Newmark:
     ------
     BodyError
         A step that is unstable (with the largest stable one), a weight or factor out of range, a body without mass.
+    UnitError
+        A step that is no time.
 
     """
 
     def __init__(
         self,
         body: Body,
-        dt: float = 1e-3,
+        dt: float | str = 1e-3,
         alpha: float = 0.25,
         delta: float = 0.5,
         rayleigh: tuple[float, float] = (0.0, 0.0),
@@ -76,11 +79,15 @@ class Newmark:
             raise BodyError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
         if modes is not None and method in ("sparse", "dense"):
             raise BodyError(f"the method '{method}' takes no modes: it moves all dofs")
-        self.dt = float(dt)
+        if not isinstance(body, Body):
+            raise BodyError(f"Newmark takes a palpate.Body, got {brief_repr(body)}")
+        self.dt = units.time(dt)
         self._body = body
         self._matrices = Matrices.of(body, mass)
-        a, b = (float(factor) for factor in rayleigh)
-        self._scheme = (self.dt, float(alpha), float(delta), a, b)
+        if isinstance(rayleigh, str) or not isinstance(rayleigh, Iterable) or len(factors := list(rayleigh)) != 2:
+            raise BodyError(f"rayleigh must be two factors, a (1/s) and b (s), got {brief_repr(rayleigh)}")
+        a, b = (number(factor, "a factor of rayleigh", BodyError) for factor in factors)
+        self._scheme = (self.dt, number(alpha, "alpha", BodyError), number(delta, "delta", BodyError), a, b)
         self._largest_eigenvalue: float | None = None
         self._residual: Residual | None = None
         u, v = self._initial(displacements, "displacements"), self._initial(velocities, "velocities")
@@ -114,6 +121,10 @@ class Newmark:
         if not isinstance(count, (int, np.integer)) or count < 0:
             raise BodyError(f"the number of steps must be a whole number, got {count!r}")
         load = np.zeros_like(self._forces)
+        if not isinstance(forces, Mapping | None):
+            raise BodyError(
+                f"forces must map nodes to three numbers, such as {{7: (0, 0, -1)}}, got {brief_repr(forces)}"
+            )
         for node, force in (forces or {}).items():
             first = 3 * self._node(node)
             load[first : first + 3] += three_numbers(force, f"forces: node {node}", BodyError)
@@ -140,10 +151,15 @@ class Newmark:
         numpy.ndarray
             (steps, w, 3) displacements of the watched nodes after each step, m.
 
+        Raises
+        ------
+        BodyError
+            Nodes that do not exist or are named twice, or forces of another shape or not finite.
+
         """
-        loaded = [self._node(node) for node in nodes]
-        seen = loaded if watch is None else [self._node(node) for node in watch]
-        history = np.array(forces, dtype=float)
+        loaded = self._nodes(nodes, "nodes")
+        seen = loaded if watch is None else self._nodes(watch, "watch")
+        history = number_array(forces, "forces", BodyError)
         if history.ndim != 3 or history.shape[1:] != (len(loaded), 3) or len(set(loaded)) != len(loaded):
             raise BodyError(f"forces must have shape (steps, {len(loaded)}, 3) for as many different nodes")
         if not np.isfinite(history).all():
@@ -231,16 +247,21 @@ class Newmark:
 
     def _initial(self, values: np.ndarray | None, name: str) -> np.ndarray:
         shape = self._body.mesh.nodes.shape
-        array = np.zeros(shape) if values is None else np.array(values, dtype=float)
+        array = np.zeros(shape) if values is None else number_array(values, f"the initial {name}", BodyError).copy()
         if array.shape != shape or not np.isfinite(array).all():
             raise BodyError(f"the initial {name} must be {shape} finite numbers, got shape {array.shape}")
         array[self._body.fixed_mask] = 0.0
         return array.ravel()
 
-    def _node(self, node: int) -> int:
+    def _nodes(self, nodes: Sequence[int], what: str) -> list[int]:
+        if isinstance(nodes, str) or not isinstance(nodes, Iterable):
+            raise BodyError(f"{what} must be a list of node numbers, got {brief_repr(nodes)}")
+        return [self._node(node, what) for node in nodes]
+
+    def _node(self, node: int, what: str = "forces") -> int:
         count = len(self._body.mesh.nodes)
         if not isinstance(node, (int, np.integer)) or not 0 <= node < count:
-            raise BodyError(f"forces: node {node!r} does not exist: the mesh has nodes 0 to {count - 1}")
+            raise BodyError(f"{what}: node {brief_repr(node)} does not exist: the mesh has nodes 0 to {count - 1}")
         return int(node)
 
 

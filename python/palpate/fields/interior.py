@@ -7,6 +7,7 @@ import numpy as np
 from palpate import _native
 from palpate.body import Body, problem_arrays
 from palpate.errors import BodyError
+from palpate.vectors import number_array
 
 
 class Interior:
@@ -22,7 +23,7 @@ class Interior:
 
     def extend(self, displacements: np.ndarray) -> np.ndarray:
         """Displacements of all nodes, (n, 3) m, from (s, 3) m at the surface nodes."""
-        given = np.ascontiguousarray(displacements, dtype=np.float64)
+        given = number_array(displacements, "displacements", BodyError)
         if given.shape != (self._surface, 3) or not np.isfinite(given).all():
             raise BodyError(f"displacements must be finite and of shape ({self._surface}, 3), got {given.shape}")
         return self.core.extend(given.ravel()).reshape(-1, 3)

@@ -27,8 +27,10 @@ import scipy
 
 from palpate.body import Body
 from palpate.equality import ComparedByValue
+from palpate.errors import BodyError
 from palpate.fields.interior import Interior
 from palpate.mesh.shape_functions import tetrahedron_gradients
+from palpate.vectors import number_array
 
 # Barycentric sample points of an element by its number of nodes.
 _FAR, _NEAR = (1 + 3 / 5**0.5) / 4, (1 - 1 / 5**0.5) / 4
@@ -144,8 +146,18 @@ class StressRecovery:
         return self.recover_inside(self.interior.extend(displacements))
 
     def recover_inside(self, everywhere: np.ndarray) -> SurfaceStress:
-        """Stress and strain for displacements of all nodes, (n, 3) m, as the interior extends them."""
-        gradient = self._fit @ (self._gradient @ everywhere.ravel()).reshape(-1, 9)
+        """Stress and strain for displacements of all nodes, (n, 3) m, as the interior extends them.
+
+        Raises
+        ------
+        BodyError
+            Displacements that are not finite or of another shape.
+
+        """
+        given, shape = number_array(everywhere, "displacements", BodyError), (self._gradient.shape[1] // 3, 3)
+        if given.shape != shape or not np.isfinite(given).all():
+            raise BodyError(f"displacements must be finite and of shape {shape}, got {given.shape}")
+        gradient = self._fit @ (self._gradient @ given.ravel()).reshape(-1, 9)
         strain = gradient @ STRAIN_OF_GRADIENT.T
         lam, mu = self._lame
         stress = 2 * mu[:, None] * strain

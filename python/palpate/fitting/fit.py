@@ -27,7 +27,7 @@ def fit(
     scene: Scene | str | os.PathLike[str],
     measured: Indentations | str | os.PathLike[str],
     *,
-    hold: Sequence[str] = (),
+    hold: str | Sequence[str] = (),
     find_touch: bool = False,
     confidence: float = 0.95,
 ) -> Fit:
@@ -43,7 +43,7 @@ def fit(
     measured
         Curves of force against depth; or a CSV file, see :meth:`palpate.Indentations.read`.
     hold
-        Keys that stay as they are, such as ``"poissons_ratio"`` or ``"region.0.youngs_modulus"``.
+        Key or keys that stay as they are, such as ``"poissons_ratio"`` or ``"region.0.youngs_modulus"``.
     find_touch
         Whether the depth of first touch of each curve is fitted too.
     confidence
@@ -67,7 +67,7 @@ def fit(
     read = scene if isinstance(scene, Scene) else Scene.read(scene)
     data = measured if isinstance(measured, Indentations) else Indentations.read(measured)
     unknowns = Unknowns(read)
-    chosen = chosen_to_fit(unknowns, hold)
+    chosen = chosen_to_fit(unknowns, (hold,) if isinstance(hold, str) else hold)
     presses = Presses(unknowns, read, data.loading())
     try:
         return _Search(unknowns, presses, data, find_touch, confidence).run(chosen, read)

@@ -12,6 +12,8 @@ import numpy as np
 from palpate.equality import ComparedByValue
 from palpate.errors import FitError
 from palpate.fitting.csv_file import read_columns
+from palpate.units import length
+from palpate.vectors import number_array
 
 # A press has reached its largest depth where it comes as close to it as this part of its range.
 AT_DEEPEST = 0.002
@@ -51,26 +53,37 @@ class Indentations(ComparedByValue):
         rows = {"force": self.force, "depth": self.depth, "time": self.time}
         for name, values in rows.items():
             if values is not None:
-                object.__setattr__(self, name, np.asarray(values, dtype=float).ravel())
-        curve = np.zeros(len(self.force), int) if self.curve is None else np.asarray(self.curve).astype(int).ravel()
+                object.__setattr__(self, name, number_array(values, f"{name} of indentations", FitError).ravel())
+        numbers = np.zeros(len(self.force)) if self.curve is None else number_array(self.curve, "curve", FitError)
+        curve = np.nan_to_num(numbers, nan=-1).astype(int).ravel()
         object.__setattr__(self, "curve", curve)
         if len(self.depth) != len(self.force) or len(curve) != len(self.force):
             raise FitError(f"{len(self.force)} forces, {len(self.depth)} depths and {len(curve)} curves: give as many")
+        if not len(self.force):
+            raise FitError("indentations need rows of force and depth, got none")
         finite = np.isfinite(self.force) & np.isfinite(self.depth)
         if not finite.all():
             raise FitError(f"row {int(np.argmin(finite))} of the indentations is not finite")
         count = int(curve.max(initial=0)) + 1
         if set(np.unique(curve).tolist()) != set(range(count)):
             raise FitError(f"curves must be numbered from 0 to {count - 1}, each with rows")
-        if self.points is not None:
-            points = np.asarray(self.points, dtype=float).reshape(-1, 3)
-            if len(points) != count:
-                raise FitError(f"{count} curves need as many points, got {len(points)}")
-            object.__setattr__(self, "points", points)
+        self._check_places(count)
         object.__setattr__(self, "names", self.names or tuple(f"curve {k + 1}" for k in range(count)))
         for k, name in enumerate(self.names):
             if (curve == k).sum() < FEWEST_ROWS or not self.depth[curve == k].max() > 0:
                 raise FitError(f"{name} needs {FEWEST_ROWS} rows or more, and a depth above zero")
+
+    def _check_places(self, curves: int) -> None:
+        """Take the places of the curves, and the radius of the indenter; FitError for wrong ones."""
+        if self.points is not None:
+            points = np.atleast_2d(number_array(self.points, "points", FitError))
+            if points.shape != (curves, 3) or not np.isfinite(points).all():
+                raise FitError(f"points must be ({curves}, 3) finite numbers, one row a curve, got {points.shape}")
+            object.__setattr__(self, "points", points)
+        if self.radius is not None:
+            object.__setattr__(self, "radius", length(self.radius))
+            if not 0 < self.radius < np.inf:
+                raise FitError(f"the radius of the indenter must be positive, got {self.radius:g} m")
 
     def __repr__(self) -> str:
         deepest = 1e3 * self.depth.max()

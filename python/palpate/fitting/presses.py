@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 DEPTHS = 90
 # Computed presses go deeper than measured ones by this factor, for the touch may have been earlier.
 DEEPER = 1.15
+# Of the tool's radius: the law of a contact ends at two, rows beyond it are left out, and so many are in another unit.
+MOST_RADII = 10.0
 # A place farther from the surface than this part of the tool's size is none.
 FAR = 1.0
 
@@ -49,10 +51,28 @@ class Presses:
         self._scene = _to_press(scene, measured)
         self._reference = unknowns.slots[0].material.youngs_modulus
         self._known: dict[tuple[float, ...], Curves] = {}
-        self._folder = tempfile.TemporaryDirectory(prefix="palpate-fit-")
         self._mesh = mesh_of_body(self._scene)
+        self._require_depths()
+        self._folder = tempfile.TemporaryDirectory(prefix="palpate-fit-")
         self.points = self.normals = np.empty((0, 3))
         self.solved = 0
+
+    def _require_depths(self) -> None:
+        """Refuse depths far beyond the tool, or beyond the body: their unit is another one."""
+        depths, tool = self._measured.depth, self._scene.tools[0]
+        deepest = int(depths.argmax())
+        longest = float(np.ptp(self._mesh.nodes, axis=0).max())
+        limits = {
+            "ten radii of the tool, which are": MOST_RADII * tool.reach,
+            "the body, whose longest side is": longest,
+        }
+        for what, limit in limits.items():
+            if 0 < limit < depths[deepest]:
+                name = self._measured.names[self._measured.curve[deepest]]
+                raise FitError(
+                    f"{name}: a depth of {1e3 * depths[deepest]:.4g} mm is beyond {what} {1e3 * limit:.4g} mm: are the "
+                    "depths in another unit (--depth-unit)?"
+                )
 
     @property
     def has_pad(self) -> bool:

@@ -6,7 +6,7 @@ import json
 import operator
 import os
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,7 @@ from palpate.green.bounds import check_error
 from palpate.input_file import require_file
 from palpate.leftovers import remove_leftovers
 from palpate.mesh import size_text
+from palpate.units import brief_repr
 from palpate.vectors import Reader, brief, three_components, three_numbers
 
 # Numbers in SI, or text with a unit.
@@ -261,6 +262,8 @@ class GreensFunction:
         """
         forced = self._by_column(forces, "forces", units.force)
         placed = self._by_column(displacements, "displacements", units.length)
+        if isinstance(release, str) or not isinstance(release, Iterable):
+            raise BodyError(f"release must be a list of fixed nodes, got {brief_repr(release)}")
         freed = {column for node in release for column in self._released_columns(node)}
         u, f, reactions, error = self._core.solve(forced, placed, freed)
         check_error(error, self.precision, "the answer", stacklevel=2)

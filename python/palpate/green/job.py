@@ -23,6 +23,9 @@ from palpate.input_file import require_writable
 from palpate.leftovers import remove_leftovers
 from palpate.units import brief_repr
 
+# Number formats of stores.
+PRECISIONS = ("f16", "f32", "f64")
+
 
 @dataclass(frozen=True)
 class Job:
@@ -48,6 +51,10 @@ class Job:
         """Check everything that can be checked before a number is computed; errors as of :func:`palpate.precompute`."""
         if not isinstance(body, Body):
             raise BodyError(f"precompute takes a palpate.Body, got {brief_repr(body)}")
+        if precision not in (None, *PRECISIONS):
+            raise BodyError(
+                f"unknown precision {brief_repr(precision)}: use {', '.join(map(repr, PRECISIONS))} or None"
+            )
         body.require_supported()
         region = surface_region(body, touch, "touch")
         nodes = np.empty(0, np.int64) if first is None else np.intersect1d(surface_region(body, first, "first"), region)

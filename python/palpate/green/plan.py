@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import math
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from palpate import _native
+from palpate import _native, units
 from palpate.body import Body, SurfaceRegion
+from palpate.errors import BodyError
 from palpate.green.disk import DiskUse, free_bytes
 from palpate.green.job import Job
 from palpate.green.memory import memory_in_use
 from palpate.green.series import SeriesJob
+from palpate.units import brief_repr
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -106,8 +109,8 @@ class Plan:
             f"{n / 1e9:.3g}" for n in (self.factor_flops, self.sweep_flops, self.surface_last_flops)
         )
         lines = (
-            f"{self.columns} columns of {self.rows} rows: factor {factor} Gflop, columns {sweeps} Gflop by sweeps "
-            f"(surface last: at least {other})\n"
+            f"{self.columns} columns of {self.rows} rows: {factor} Gflop for the factor, {sweeps} Gflop for the "
+            f"columns (with the surface ordered last at least {other} Gflop)\n"
             f"peak memory {self.memory / 1e9:.2f} GB, {self.tasks} tasks with {self.block} columns each, "
             f"store {self.store / 1e9:.3g} GB in {self.precision}\n"
             f"disk {self.disk / 1e9:.3g} GB at most of {self.disk_free / 1e9:.3g} GB free, "
@@ -125,11 +128,12 @@ def plan(
     path: str | os.PathLike[str] | None = None,
     memory: int | str | None = None,
     dask: str | Client | None = None,
-    radii: Sequence[float] = (),
+    radii: Sequence[float | str] = (),
 ) -> Plan:
     """Count what :func:`palpate.precompute` would do with the same arguments.
 
-    With ``radii`` of spheres, m, the series of a hyperelastic body below them are counted too.
+    With ``radii`` of spheres, m or text such as ``"5mm"``, the series of a hyperelastic body below them are counted
+    too.
 
     With ``dask`` the memory is that of a worker with as many threads as this process has, and may be more than this
     machine has. No connection is made.
@@ -137,12 +141,14 @@ def plan(
     Raises
     ------
     BodyError
-        A bound of memory that is too small, or a body that :func:`palpate.precompute` refuses.
+        A bound of memory that is too small, radii that are not positive, or a body that :func:`palpate.precompute`
+        refuses.
     StoreError
         Files that have no room on the disk.
 
     """
     job = Job.of(body, precision, touch, first, path)
+    spheres = _radii(radii)
     used = memory_in_use()
     allowed = job.allowed(memory)
     if dask is not None and memory is None:
@@ -155,9 +161,19 @@ def plan(
     factor, columns = FACTOR_EFFICIENCY * double, COLUMN_EFFICIENCY * rate
     seconds = counts["factor_flops"] / factor + counts["sweep_flops"] / columns
     rates = (factor, double)
-    series = tuple(_plan_series(series, counts, rates) for series in SeriesJob.of_store(job, radii))
+    series = tuple(_plan_series(series, counts, rates) for series in SeriesJob.of_store(job, spheres))
     added = {"series": series, "disk": disk.peak, "disk_free": free_bytes(job.target), "seconds": seconds}
     return Plan(**{**counts, "memory": used + counts["memory"]}, **added)
+
+
+def _radii(radii: Sequence[float | str]) -> list[float]:
+    """Take radii of spheres, m or text; BodyError for radii that are not positive."""
+    if isinstance(radii, str) or not isinstance(radii, Iterable):
+        raise BodyError(f"radii must be a list of positive lengths, got {brief_repr(radii)}")
+    found = [units.length(radius) for radius in radii]
+    if not all(0 < radius < math.inf for radius in found):
+        raise BodyError(f"radii must be a list of positive lengths, got {brief_repr(radii)}")
+    return found
 
 
 def _plan_series(job: SeriesJob, counts: dict[str, Any], rates: tuple[float, float]) -> SeriesPlan:

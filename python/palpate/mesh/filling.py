@@ -15,6 +15,7 @@ import numpy as np
 from palpate.errors import MeshError, MeshWarning
 from palpate.mesh.child import FILES_FAILED, OUT_OF_PROCESSOR_TIME, failure_of, run_limited
 from palpate.mesh.curve import curve, refine
+from palpate.mesh.element_count import IN_CUBE
 from palpate.mesh.fill_job import PARTS, FillJob, length_text
 from palpate.mesh.fit import GOOD_LOSS, Fit, mean_edge
 from palpate.mesh.surface_state import SurfaceState
@@ -31,10 +32,9 @@ FINEST, ATTEMPTS, LOST = 4.0, 5, 0.05
 ATTEMPTS_GIVEN = 2
 
 # NETGEN takes about 0.25 ms for each tetrahedron, more than the columns of a region of touch. Beyond so many it makes
-# them twice as large, and each is cut into eight (`refine`). Measured on the liver: so many lie in a cube as wide as
-# the size asked for. Cutting twice was tried: where a body is thin NETGEN's elements are then smaller than asked for,
-# and 64 times as many are half again too many.
-MOST_BY_NETGEN, IN_CUBE = 30_000, 3.5
+# them twice as large, and each is cut into eight (`refine`). Cutting twice was tried: where a body is thin NETGEN's
+# elements are then smaller than asked for, and 64 times as many are half again too many.
+MOST_BY_NETGEN = 30_000
 
 # Seconds for NETGEN to prove that a surface that intersects itself can be filled: mostly it hangs, or crashes.
 TIME_LIMIT = 30.0

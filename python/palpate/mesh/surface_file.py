@@ -66,7 +66,7 @@ def load_surface(surface: str | os.PathLike[str] | trimesh.Trimesh | SurfaceFile
             return found
     if reasons:
         raise MeshError(f"{path}: cannot be read as a surface ({reasons[-1]})")
-    raise MeshError(f"{path}: holds no triangles; is it really a {path.suffix[1:].upper()} file?")
+    raise MeshError(f"{path}: holds no triangles; is it really a file in {path.suffix[1:].upper()} format?")
 
 
 @contextlib.contextmanager

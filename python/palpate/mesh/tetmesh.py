@@ -25,6 +25,8 @@ from palpate.mesh.elements import (
 )
 from palpate.mesh.files import Volume, read_volume, write_volume
 from palpate.mesh.shapes import Shape, elements_inside
+from palpate.units import brief_repr
+from palpate.vectors import number_array
 
 # An element flatter than this part of the cube of its longest edge has no usable shape functions.
 DEGENERATE = 1e-12
@@ -69,11 +71,11 @@ class TetMesh:
         regions: np.ndarray | None = None,
         region_names: Mapping[str, int] | None = None,
     ):
-        nodes = np.array(nodes, dtype=np.float64, order="C", copy=True)
+        nodes = number_array(nodes, "nodes", MeshError).copy()
         tets = _index_array(tets)
         if nodes.ndim != 2 or nodes.shape[1] != 3:
             raise MeshError(f"nodes must have shape (n, 3), got {nodes.shape}")
-        regions = np.zeros(len(tets), dtype=np.int64) if regions is None else np.array(regions, dtype=np.int64)
+        regions = _region_array(regions, len(tets))
         if regions.shape != (len(tets),):
             raise MeshError(f"regions must have shape ({len(tets)},), got {regions.shape}")
         _check_indices(nodes, tets)
@@ -81,6 +83,8 @@ class TetMesh:
         self.nodes = nodes
         self.tets = _orient(nodes, tets)
         self.regions = regions
+        if not isinstance(region_names, Mapping | None):
+            raise MeshError(f"region_names must map names to labels, got {brief_repr(region_names)}")
         self.region_names = dict(region_names or {})
         for array in (self.nodes, self.tets, self.regions):
             array.setflags(write=False)
@@ -215,6 +219,15 @@ class TetMesh:
     def write(self, path: str | os.PathLike[str], unit: str = "m") -> None:
         """Write the mesh and its regions in the format of the file's ending; replaced only when complete."""
         write_volume(Volume(self.nodes, self.tets, self.regions, self.region_names), Path(path), unit)
+
+
+def _region_array(regions: np.ndarray | None, count: int) -> np.ndarray:
+    if regions is None:
+        return np.zeros(count, dtype=np.int64)
+    given = number_array(regions, "regions", MeshError)
+    if not (given == np.trunc(given)).all():
+        raise MeshError(f"regions must be whole numbers, got {brief_repr(regions)}")
+    return np.array(regions).astype(np.int64)
 
 
 def _index_array(tets: np.ndarray) -> np.ndarray:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.errors import MeshError
+from palpate.mesh.element_count import require_fitting_size
 from palpate.mesh.fill_job import Ball, Element, FillJob, FillOptions, Mesher, Which
 from palpate.mesh.filling import Filling, MesherFailedError
 from palpate.mesh.segmented import Draw, segmented
@@ -133,6 +134,7 @@ def tetrahedralize_with(
         else:
             given = _scaled(surface, unit, job.options)
             stage("checking")
+            require_fitting_size(given.name, given.shape, job)
             name, mesh = given.name, _filled(given, job)
     mesh.warn_of_flat_elements(name)
     return mesh

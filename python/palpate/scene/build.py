@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -20,7 +21,7 @@ from palpate.mesh.label_summary import label_summary
 from palpate.mesh.size import scale_of
 from palpate.mesh.tetrahedralize import closed_surface, read_surface, tetrahedralize_with
 from palpate.progress import progress_reporter
-from palpate.scene.default_radius import with_radii
+from palpate.scene.default_radius import require_tool_sizes, with_radii
 from palpate.scene.dynamics import BodyMotion
 from palpate.scene.early import Expected, pressing_radii
 from palpate.scene.loads import together
@@ -102,6 +103,8 @@ def build(
 ) -> BuiltScene:
     """See :meth:`palpate.Scene.build`, and with ``growing`` :meth:`palpate.Scene.build_first`."""
     builders = [_Builder(scene, rank, growing, progress, announce, dask) for rank in range(len(scene.bodies))]
+    # Before anything is solved.
+    require_tool_sizes(scene, max(builder.prepare() for builder in builders))
     return BuiltScene(scene, tuple(builder.build(progress, modes_progress) for builder in builders))
 
 
@@ -139,7 +142,10 @@ def locating_errors(
         yield
     except Error as error:
         table = next(key for key in reversed(place) if isinstance(key, str))
-        message = f"{located(*scene.source, place)}: {table}: {error}"
+        text = str(error)
+        # What was asked for may have the name of its table.
+        text = text if text.startswith(f"{table}: ") else f"{table}: {text}"
+        message = f"{located(*scene.source, place)}: {text}"
         if isinstance(error, UnclearUnitError):
             raise UnclearUnitError(message, error.fitting) from None
         raise (kind or type(error))(message) from None
@@ -147,8 +153,8 @@ def locating_errors(
 
 def require_files(scene: SceneTables) -> None:
     """See :meth:`palpate.Scene.require_files`."""
-    for rank in range(len(scene.bodies)):
-        _Builder(scene, rank).require_files()
+    sides = [_Builder(scene, rank).require_files() for rank in range(len(scene.bodies))]
+    require_tool_sizes(scene, max(sides, default=math.inf))
     for rank, tool in enumerate(scene.tools):
         with locating_errors(scene, ["tool", rank, "shape"]):
             tool.shape_arguments(scene.folder)
@@ -169,15 +175,25 @@ class _Builder:
         self._scene, self._rank, self._growing, self._filling = scene, rank, growing, filling
         self._announce, self._dask = announce, dask
         self._table: BodyTable = scene.bodies[rank]
+        # The store, or the body before it is solved.
+        self._prepared: GreensFunction | Body | None = None
+
+    def prepare(self) -> float:
+        """Read or make the body, before anything is solved; returns its longest side, m."""
+        if self._table.store is None:
+            self._prepared = body = self.body()
+            return float(np.ptp(body.mesh.nodes, axis=0).max())
+        with self._locating_errors_in_file(["body", self._rank, "store"]):
+            self._prepared = green = GreensFunction.load(self._scene.folder / self._table.store)
+        return float(green.extents.max())
 
     def build(self, progress: Progress, modes_progress: Progress | None) -> BuiltBody:
-        table = self._table
+        """Solve the body that was prepared."""
+        table, body = self._table, self._prepared
         place = (table.title, table.position, table.orientation)
-        if table.store is not None:
-            with self._locating_errors_in_file(["body", self._rank, "store"]):
-                green = GreensFunction.load(self._scene.folder / table.store)
-            return BuiltBody(None, green, None, *place)
-        body = self.body()
+        if isinstance(body, GreensFunction):
+            return BuiltBody(None, body, None, *place)
+        assert body is not None
         green = self._green(body, progress)
         dynamics, where = self._table_of_body("dynamics")
         if dynamics is None:
@@ -215,26 +231,27 @@ class _Builder:
             with self._locating_errors(place):
                 table.material(base)
 
-    def require_files(self) -> None:
-        """Look at what building would read; a surface that is yet to be filled only by itself."""
+    def require_files(self) -> float:
+        """Look at what building would read; a surface that is yet to be filled only by itself.
+
+        Returns the longest side of the body, m; that of a segmentation is infinite: it is not known yet.
+        """
         self._require_materials()
         table = self._table
-        if table.store is not None:
-            self.build(False, None)
-        elif not table.fills_a_surface:
-            self.body()
-        else:
-            with self._locating_errors_in_file(["body", self._rank, "mesh"]):
-                if is_segmentation(str(table.mesh)):
-                    wanted = [segment.name for segment in table.segment]
-                    label_summary(self._scene.folder / str(table.mesh), table.unit, wanted)
-                    return
-                read = closed_surface if table.mesher == "netgen" else read_surface
-                surface = read(self._scene.folder / str(table.mesh))
-                vertices = surface.vertices * scale_of(str(table.mesh), surface.vertices, table.unit)
-            supports, where = self._table_of_body("supports")
-            with self._locating_errors_in_file(where):
-                _predicate_mask(supports.fixed, vertices)
+        if not table.fills_a_surface:
+            return self.prepare()
+        with self._locating_errors_in_file(["body", self._rank, "mesh"]):
+            if is_segmentation(str(table.mesh)):
+                wanted = [segment.name for segment in table.segment]
+                label_summary(self._scene.folder / str(table.mesh), table.unit, wanted)
+                return math.inf
+            read = closed_surface if table.mesher == "netgen" else read_surface
+            surface = read(self._scene.folder / str(table.mesh))
+            vertices = surface.vertices * scale_of(str(table.mesh), surface.vertices, table.unit)
+        supports, where = self._table_of_body("supports")
+        with self._locating_errors_in_file(where):
+            _predicate_mask(supports.fixed, vertices)
+        return float(np.ptp(vertices, axis=0).max())
 
     def _table_of_body(self, key: str) -> tuple[Any, list[str | int]]:
         """Table of the body, or that of the whole scene; and its place in the file."""

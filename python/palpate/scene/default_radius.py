@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from palpate.errors import SceneError
 from palpate.green import GreensFunction
 from palpate.mesh import size_text
+from palpate.scene.mistakes import located
 from palpate.scene.tables import SceneTables, ToolTable
 from palpate.scene.tool_shape import KEYS
 
@@ -34,31 +35,38 @@ def with_radii(scene: SceneTables, greens: Sequence[GreensFunction]) -> SceneTab
     Raises SceneError for a contact radius that covers more nodes than a tick can weigh, and a rounding wider than the
     radius. A tool larger than the bodies, or smaller than a hundredth of an element, is refused too.
     """
-    for tool in scene.tools:
-        _require_size(tool, greens)
+    largest = max(float(green.extents.max()) for green in greens)
+    require_tool_sizes(scene, largest, min(green.edge_length for green in greens))
     tools = [_with_radii(tool, greens) for tool in scene.tools]
     return scene if tools == scene.tools else scene.model_copy(update={"tools": tools})
 
 
-def _require_size(tool: ToolTable, greens: Sequence[GreensFunction]) -> None:
-    """Refuse a tool that cannot be meant for these bodies: its lengths were given in another unit."""
+def require_tool_sizes(scene: SceneTables, largest: float, edge: float | None = None) -> None:
+    """Refuse tools that cannot be meant for these bodies: their lengths were given in another unit.
+
+    ``largest`` is the longest side of the bodies, ``edge`` the shortest edge of their elements, m, where it is known.
+    The SceneError names the line of a scene that is a file.
+    """
+    path, text = scene.source
+    for rank, tool in enumerate(scene.tools):
+        for name, mistake in _mistaken_lengths(tool, largest, edge):
+            where = f"{located(path, text, ['tool', rank, name])}: " if text else ""
+            raise SceneError(f"{where}{mistake}: give metres, or text such as '6mm'")
+
+
+def _mistaken_lengths(tool: ToolTable, largest: float, edge: float | None) -> Iterator[tuple[str, str]]:
+    """Keys of a tool whose lengths do not suit the bodies, and why."""
     given = {"radius": tool.radius, "contact_radius": tool.contact_radius, "length": tool.length}
     lengths = {name: value for name, value in given.items() if value is not None}
     if tool.semi_axes is not None:
         lengths["semi_axes"] = max(tool.semi_axes)
-    largest = max(float(green.extents.max()) for green in greens)
-    edge = min(green.edge_length for green in greens)
     for name, value in lengths.items():
         if value > largest:
-            raise SceneError(
-                f"tool.{name} is {value:.4g} m, more than the longest side of the bodies, {size_text([largest])}: give "
-                f"metres, or text such as '6mm'"
-            )
-        if name in ("radius", "semi_axes") and value < LEAST_OF_EDGE * edge:
-            raise SceneError(
-                f"tool.{name} is {value:.4g} m, less than a hundredth of an element, whose edges are "
-                f"{size_text([edge])}: give metres, or text such as '6mm'"
-            )
+            what = f"tool.{name} is {value:.4g} m, more than the longest side of the bodies"
+            yield name, f"{what}, {size_text([largest])}"
+        if edge is not None and name in ("radius", "semi_axes") and value < LEAST_OF_EDGE * edge:
+            what = f"tool.{name} is {value:.4g} m, less than a hundredth of an element"
+            yield name, f"{what}, whose edges are {size_text([edge])}"
 
 
 def _with_radii(tool: ToolTable, greens: Sequence[GreensFunction]) -> ToolTable:

@@ -58,7 +58,9 @@ def explain(path: Path, text: str, error: ValidationError, model: type[BaseModel
         hint = f"did you mean '{near[0]}'?" if near else f"known are {', '.join(known)}"
         return f"{at}: unknown key '{where}'; {hint}"
     if first["type"] == "missing" and isinstance(place[-1], int):
-        return f"{at}: {where} has too few entries"
+        given, owner = place[-1], first["loc"][:-1]
+        missing = sum(other["type"] == "missing" and other["loc"][:-1] == owner for other in error.errors())
+        return f"{at}: {where} has too few entries: it needs {given + missing}, got {given}"
     if first["type"] == "missing":
         return f"{at}: the key '{where}' is missing"
     if first["type"] == "value_error":

@@ -3,7 +3,7 @@
 from palpate.simulation.about import scene_of, shown_of
 from palpate.simulation.frame import BodyFrame, Contact, Frame, frame_of
 from palpate.simulation.packed import pack
-from palpate.simulation.recording import CONTACT_DTYPE, Recording, RecordingStatus
+from palpate.simulation.recording import CONTACT_DTYPE, Recording, RecordingStatus, require_new_recording
 from palpate.simulation.replay import Difference, Replayed, replay, simulation_of, ticks_before_gap
 from palpate.simulation.replayed import ReplayedSimulation
 from palpate.simulation.sensor import Sensor, SensorContacts
@@ -25,6 +25,7 @@ __all__ = [
     "frame_of",
     "pack",
     "replay",
+    "require_new_recording",
     "scene_of",
     "shown_of",
     "simulation_of",

@@ -155,7 +155,7 @@ class SceneEditing(SeriesGrowth):
             tool = ToolTable(**{"radius": self.scene.tools[0].radius, **table})
         except ValidationError as error:
             place = ".".join(map(str, error.errors()[0]["loc"]))
-            raise SceneError(f"tool.{place}: {reason_of(error)}") from None
+            raise SceneError(f"{'.'.join(filter(None, ('tool', place)))}: {reason_of(error)}") from None
         given = None if isinstance(device, str) else device
         rank = len(self.scene.tools)
         require_devices({} if given is None else {rank: given})

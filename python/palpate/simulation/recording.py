@@ -61,6 +61,13 @@ def _column(name: str, description: str) -> Any:
     return property(read, doc=description)
 
 
+def require_new_recording(path: Path) -> None:
+    """Refuse a file that exists, or a place where none can be put, before a loop runs that is to be recorded there."""
+    require_writable(path, SceneError)
+    if path.exists():
+        raise SceneError(f"{path}: exists: give another name, or delete it first")
+
+
 @dataclass(frozen=True)
 class RecordingStatus:
     """How the recording of a running loop is doing.

@@ -9,8 +9,7 @@ import numpy as np
 
 from palpate import units
 from palpate.errors import SceneError
-from palpate.units import brief_repr
-from palpate.vectors import three_numbers
+from palpate.vectors import number_array, three_numbers
 
 # How far from one the length of an orientation may be.
 UNIT_LENGTH = 1e-6
@@ -21,7 +20,7 @@ def positions_of(positions: Any, tools: int) -> np.ndarray:
 
     Raises SceneError for another shape, no tick, more tools than the scene has, or infinite positions.
     """
-    path = number_array(positions, "positions")
+    path = number_array(positions, "positions", SceneError)
     if path.ndim not in (2, 3) or path.shape[-1] != 3 or path.size == 0:
         raise SceneError(f"positions must have shape (ticks, 3) or (ticks, tools, 3), got {path.shape}")
     path = path[:, None] if path.ndim == 2 else path
@@ -41,7 +40,7 @@ def orientations_of(orientations: Any, positions: np.ndarray) -> np.ndarray:
     shape = (*positions.shape[:2], 4)
     if orientations is None:
         return np.broadcast_to([1.0, 0.0, 0.0, 0.0], shape).copy()
-    turned = number_array(orientations, "orientations")
+    turned = number_array(orientations, "orientations", SceneError)
     turned = turned[:, None] if turned.ndim == 2 else turned
     if turned.shape != shape:
         raise SceneError(f"orientations must have shape {shape}, as the positions, got {turned.shape}")
@@ -95,11 +94,3 @@ def strike_of(
         raise SceneError(f"a strike's duration must be a time of at least 0 s, got {seconds:g}")
     where = three_numbers(point, "a strike's point", SceneError, units.length)
     return where, three_numbers(impulse, "a strike's impulse", SceneError), seconds
-
-
-def number_array(values: Any, what: str) -> np.ndarray:
-    """Take values as an array of numbers; SceneError for values that are none."""
-    try:
-        return np.ascontiguousarray(values, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        raise SceneError(f"{what} must be an array of numbers, got {brief_repr(values)}") from None

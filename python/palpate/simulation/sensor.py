@@ -12,10 +12,11 @@ from palpate import _native, units
 from palpate.equality import ComparedByValue
 from palpate.errors import SceneError
 from palpate.scene import BuiltScene, Scene
-from palpate.simulation.script import number_array, require_unit_length
+from palpate.simulation.script import require_unit_length
 from palpate.simulation.simulation import Simulation
 from palpate.simulation.taxels import taxel_sides
 from palpate.units import brief_repr
+from palpate.vectors import number_array
 
 POSE, WRENCH, CONTACT = 7, 6, 21
 MOST_COPIES = 65_536
@@ -149,7 +150,7 @@ class Sensor:
         Raises
         ------
         SceneError
-            Another shape, a quaternion that is not of length one, or a time that is not positive.
+            Another shape, an infinite position, a quaternion that is not of length one, or a time that is not positive.
 
         """
         period = 1.0 / self._scene.device.rate if dt is None else units.time(dt)
@@ -230,12 +231,18 @@ class Sensor:
 
     def _poses(self, poses: np.ndarray) -> np.ndarray:
         shape = (self._count, self.tools, POSE)
-        given = number_array(poses, "poses")
+        given = number_array(poses, "poses", SceneError)
         alone = (self._count == 1 and given.shape == shape[1:]) or (self.tools == 1 and given.shape == shape[::2])
         if alone or (given.shape == (POSE,) and shape[:2] == (1, 1)):
             given = given.reshape(shape)
         if given.shape != shape:
             raise SceneError(f"poses must have shape {shape}, got {given.shape}")
+        infinite = np.argwhere(np.isinf(given[..., :3]).any(axis=2))
+        if len(infinite):
+            copy, tool = infinite[0]
+            raise SceneError(
+                f"the position of tool {tool} of copy {copy} is infinite; NaN takes a tool out of the scene"
+            )
         present = np.isfinite(given[..., :3]).all(axis=2)
         require_unit_length(given[..., 3:], present, "of copy")
         return given

@@ -24,14 +24,13 @@ from palpate.dynamics import Energy
 from palpate.errors import SceneError, SimulationError, TouchWarning
 from palpate.fields import StrainMeasure, SurfaceStress
 from palpate.green import GreensFunction
-from palpate.input_file import require_writable
 from palpate.scene import BodyMotion, BuiltBody, BuiltScene, Scene
 from palpate.simulation.about import about
 from palpate.simulation.arguments import body_arguments, tool_arguments
 from palpate.simulation.changing import SceneEditing
 from palpate.simulation.connecting import assume_tables, connect, disconnect, largest_force, require_devices
 from palpate.simulation.frame import Contact, Frame, contact_of, frame_of
-from palpate.simulation.recording import LOG_DTYPE, Recording, RecordingStatus
+from palpate.simulation.recording import LOG_DTYPE, Recording, RecordingStatus, require_new_recording
 from palpate.simulation.scheduling import scheduled, start_loop
 from palpate.simulation.script import for_all_tools, grabs_of, orientations_of, positions_of, strike_of
 from palpate.simulation.thin import thin_places
@@ -212,9 +211,7 @@ class Simulation(SceneEditing):
 
         """
         where = Path(path)
-        require_writable(where, SceneError)
-        if where.exists():
-            raise SceneError(f"{where}: exists: give another name, or delete it first")
+        require_new_recording(where)
         if self._running:
             self._begin_recording(where)
         else:

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import ipaddress
 import socket
+
+from palpate.errors import ViewerError
 
 # Addresses for documentation (RFC 5737, RFC 3849): nothing is sent, the system only says by which address it would.
 ELSEWHERE = {socket.AF_INET: "192.0.2.1", socket.AF_INET6: "2001:db8::1"}
@@ -15,6 +18,27 @@ EVERY_ADDRESS = {
     "": (socket.AF_INET, socket.AF_INET6),
 }
 LOOPBACK = {socket.AF_INET: "127.0.0.1", socket.AF_INET6: "::1"}
+
+
+def require_free_port(host: str, port: int) -> None:
+    """Refuse a port on which something listens, before the work whose page is to be served there; ViewerError."""
+    if port == 0:
+        return
+    with contextlib.suppress(socket.gaierror):
+        for family, kind, protocol, _, address in socket.getaddrinfo(host or None, port, type=socket.SOCK_STREAM):
+            with contextlib.suppress(OSError), socket.socket(family, kind, protocol) as probe:
+                # As asyncio does: what a server has just left is free.
+                probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+                try:
+                    probe.bind(address)
+                except OSError as error:
+                    if error.errno == errno.EADDRINUSE:
+                        raise port_in_use(host, port) from None
+
+
+def port_in_use(host: str, port: int) -> ViewerError:
+    """Error for a port on which something listens."""
+    return ViewerError(f"port {port} on {host} is in use: choose another with --port, or --port 0 for a free one")
 
 
 def reachable(host: str) -> list[str]:

@@ -22,7 +22,7 @@ from palpate.errors import Error, ViewerError
 from palpate.green import BackgroundPrecompute
 from palpate.scene import BuiltScene, Scene
 from palpate.viewer import messages
-from palpate.viewer.addresses import reachable
+from palpate.viewer.addresses import port_in_use, reachable
 from palpate.viewer.client import Client
 from palpate.viewer.pages import load_pages, respond
 from palpate.viewer.session import Session, choices
@@ -157,9 +157,7 @@ class ViewerServer(SessionHost):
         except OSError as error:
             self._close_session()
             if error.errno == errno.EADDRINUSE:
-                raise ViewerError(
-                    f"port {self.port} on {self.host} is in use: choose another with --port, or --port 0 for a free one"
-                ) from None
+                raise port_in_use(self.host, self.port) from None
             raise ViewerError(f"cannot listen on {self.host}:{self.port}: {error.strerror or error}") from None
         self.port = self._server.sockets[0].getsockname()[1]
         self._interval = sys.getswitchinterval()

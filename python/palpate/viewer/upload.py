@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -77,5 +78,5 @@ def safe_name(name: Any) -> str:
 def _wrong_kind(file: str) -> str:
     ending = Path(file).suffix.lower()
     if ending in {".toml", ".palpate"}:
-        return f"{file}: scenes and stores are opened where they lie: palpate run {file}"
+        return f"{file}: scenes and stores are opened where they lie: palpate run {shlex.quote(str(file))}"
     return f"{file}: no surface, mesh or segmentation by its ending; the page takes {', '.join(ENDINGS)}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -9,6 +10,7 @@ import sys
 from command_line import refused, run
 
 import palpate
+from palpate.cache import cache_directory
 
 
 def test_cache_is_listed_by_name_size_date_and_what_it_is_and_cleared_one_by_one(block, tmp_path):
@@ -45,3 +47,12 @@ def test_cache_is_listed_by_name_size_date_and_what_it_is_and_cleared_one_by_one
     refused(run("cache", "clear", "organ", cwd=tmp_path), "no file in the cache is called 'organ'", "cache list")
     assert "deleted 5 files" in run("cache", "clear", cwd=tmp_path).stdout
     assert run("cache", "list", cwd=tmp_path).stdout.startswith("0 files")
+
+
+def test_files_of_series_are_listed_as_what_they_are(tmp_path):
+    folder = cache_directory()
+    folder.mkdir(parents=True)
+    header = json.dumps({"__metadata__": {"format": "palpate-series"}}).encode()
+    (folder / f"{'4' * 32}.0123456789abcdef.series.palpate").write_bytes(len(header).to_bytes(8, "little") + header)
+    listed = run("cache", "list", cwd=tmp_path).stdout.splitlines()
+    assert listed[0].endswith("series beyond small strain of the store with the same beginning")

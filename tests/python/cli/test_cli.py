@@ -166,10 +166,14 @@ def test_models_beside_the_counts_of_the_paper(tmp_path):
         assert count in shown
 
 
-def test_info_on_a_scene(tmp_path):
+def test_info_on_a_scene(block_green, tmp_path):
     (tmp_path / "a.toml").write_text('[body]\nmodel = "liver"\n[material]\nyoungs_modulus = "5kPa"\n')
     shown = run("info", "a.toml", cwd=tmp_path).stdout
     assert "  material.youngs_modulus = 5000.0\n" in shown and "  body.model = liver\n" in shown
+    (tmp_path / "s.toml").write_text(f'[body]\nstore = "{block_green.path}"\n')
+    shown = run("info", "s.toml", cwd=tmp_path).stdout
+    # The store's material, not the default of scenes.
+    assert "  body.material.poissons_ratio = 0.4\n" in shown and "law" not in shown and "0.45" not in shown
     several = '[[body]]\nmodel = "liver"\n[[body]]\nmodel = "kidney"\n[body.material]\nyoungs_modulus = "5kPa"\n'
     (tmp_path / "b.toml").write_text(several)
     shown = run("info", "b.toml", cwd=tmp_path).stdout

@@ -26,12 +26,18 @@ def box(tmp_path):
     return tmp_path
 
 
-@pytest.mark.parametrize("name", ["box.vtu", "notes.txt"])
-def test_a_store_takes_the_place_of_no_other_file(box, name):
-    (box / "notes.txt").write_text("what I have written by hand")
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("box.vtu", "a store ends in .palpate: name it box.palpate"),
+        ("notes.palpate", "exists, and is no store"),
+    ],
+)
+def test_a_store_takes_the_place_of_no_other_file(box, name, words):
+    (box / "notes.palpate").write_text("what I have written by hand, in some lines of text")
     before = (box / name).read_bytes()
     found = run("precompute", "box.vtu", "--unit", "m", "--fix", "z < min + 1mm", "-o", name, cwd=box)
-    refused(found, name, "exists, and is no store")
+    refused(found, name, words)
     assert (box / name).read_bytes() == before
 
 
@@ -42,6 +48,40 @@ def test_a_store_takes_the_place_of_a_store_damaged_or_not(box):
     (box / "a.palpate").write_bytes(whole[: len(whole) // 2])
     assert run(*again, cwd=box).returncode == 0
     assert (box / "a.palpate").read_bytes() == whole
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("touch", "scene.toml", "--point", "0,0,0", "--press", "0,0,0"), "'palpate precompute scene.toml' makes one"),
+        (("pack", "box.vtu", "out"), "box.vtu is no scene: write one (.toml)"),
+        (("web", "box.vtu", "out"), "box.vtu is no scene: write one (.toml)"),
+        (("web", "livr", "out"), "livr: no such file, and no model of that name; models are doll, kidney, liver, beam"),
+        (("info", "a.step"), "a.step: files of this kind are not read: scenes are .toml, stores .palpate"),
+        (("run", "a.step"), "a.step: files of this kind are not read"),
+        (("precompute", "box.vtu", "--fix", "z<1", "-E", "10mm"), "-E: unknown unit 'mm'"),
+        (("precompute", "box.vtu", "--fix", "z<1", "--unit", "MM"), "--unit: unknown length unit 'MM'"),
+        (("info", "box.vtu", "--unit", "MM"), "--unit: unknown length unit 'MM'"),
+        (("run", "box.vtu", "--headless", "1", "--unit", "MM"), "--unit: unknown length unit 'MM'"),
+        (("run", "box.vtu", "--headless", "1", "-E", "10mm"), "-E: unknown unit 'mm'"),
+        (("run", "scene.toml", "--headless", "1", "--radius", "5foo"), "--radius: unknown unit 'foo'"),
+        (("mesh", "box.vtu", "out.vtu", "--max-size", "5foo"), "--max-size: unknown unit 'foo'"),
+        (("mesh", "box.vtu", "out.vtu", "--segment", "liver=4foo"), "--segment liver=4foo: unknown unit 'foo'"),
+    ],
+)
+def test_what_does_not_suit_a_command_is_named_in_one_line(box, words, message):
+    (box / "scene.toml").write_text(SCENE)
+    (box / "a.step").write_text("ISO-10303-21;")
+    before = sorted(path.name for path in box.iterdir())
+    found = run(*words, cwd=box)
+    refused(found, message)
+    assert found.stdout == "" and sorted(path.name for path in box.iterdir() if path.name != "cache") == before
+
+
+@pytest.mark.parametrize("seconds", ["inf", "nan"])
+def test_a_run_without_an_end_is_refused(box, seconds):
+    found = run("run", "box.vtu", "--headless", seconds, cwd=box)
+    assert found.returncode == 2 and "--headless" in found.stderr
 
 
 def test_a_segment_that_is_not_stiff_is_refused(box):

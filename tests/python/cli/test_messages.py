@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import socket
+
 import numpy as np
 import pytest
 import trimesh
@@ -58,6 +60,52 @@ def test_what_cannot_be_written_is_refused_before_the_work(tmp_path):
     result = run(*make, "nowhere/box.palpate", cwd=tmp_path)
     refused(result, "there is no folder nowhere")
     assert result.stdout == ""
+
+
+BUSY = ("port", "is in use: choose another with --port, or --port 0 for a free one")
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("run", "scene.toml", "--headless", "1", "--out", "taken"), ("taken is a file: --out names a folder",)),
+        (("demo", "--headless", "1", "--out", "taken/in"), ("taken is a file: --out names a folder",)),
+        (("exam", "nodule", "--out", "taken"), ("taken is a file: --out names a folder",)),
+        (("study", "study.toml", "--out", "taken"), ("taken is a file: --out names a folder",)),
+        (("compare", "a.mcap", "b.mcap", "--out", "taken"), ("taken is a file: --out names a folder",)),
+        (("map", "scene.toml", "--grid", "1cm", "--depth", "1mm", "--out", "taken"), ("taken is a file",)),
+        (("run", "scene.toml", "--headless", "1", "--record", "old.mcap"), ("old.mcap: exists",)),
+        (("run", "scene.toml", "--record", "old.mcap"), ("old.mcap: exists",)),
+        (("run", "scene.toml", "--record", "no/a.mcap"), ("no/a.mcap: there is no folder no",)),
+        (("demo", "--record", "a.foo"), ("--record a.foo: a recording ends in .mcap: name it a.mcap",)),
+        (("run", "scene.toml", "--map", "none.vtu"), ("none.vtu: no such file",)),
+        (("run", "scene.toml", "--port", "BUSY"), BUSY),
+        (("demo", "--port", "BUSY"), BUSY),
+        (("exam", "nodule", "--port", "BUSY"), BUSY),
+    ],
+)
+def test_places_that_are_taken_are_refused_before_the_work(words, message, tmp_path, monkeypatch):
+    def work(*_, **__):
+        raise AssertionError("working")
+
+    for place in ("palpate.scene.Scene.build", "palpate.exam.Library.__init__", "palpate.simulation.Recording.load"):
+        monkeypatch.setattr(place, work)
+    monkeypatch.setattr("palpate.study.Study.read", work)
+    (tmp_path / "scene.toml").write_text('[body]\nmodel = "beam"\n')
+    (tmp_path / "taken").write_text("what I have written by hand")
+    (tmp_path / "old.mcap").write_text("a recording")
+    before = sorted(path.name for path in tmp_path.iterdir())
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = str(taken.getsockname()[1])
+        found = run(*(port if word == "BUSY" else word for word in words), cwd=tmp_path)
+    refused(found, *message)
+    assert found.stdout == "" and sorted(path.name for path in tmp_path.iterdir()) == before
+
+
+def test_printed_commands_can_be_typed(tmp_path):
+    trimesh.creation.box((0.05, 0.04, 0.03)).export(tmp_path / "my box.stl")
+    found = run("info", "my box.stl", cwd=tmp_path)
+    assert "palpate mesh 'my box.stl' 'my box.vtu' --unit m" in found.stdout
 
 
 def test_a_name_with_another_ending_is_offered(tmp_path):

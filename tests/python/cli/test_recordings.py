@@ -38,9 +38,8 @@ def recorded(cache, tmp_path_factory) -> Path:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(cache))
         result = run("run", ROOT / "examples" / "block.toml", "--headless", 1.0, "--record", "press.mcap", cwd=folder)
-    assert (
-        result.returncode == 0 and "recorded press.mcap: 'palpate replay press.mcap' computes it again" in result.stdout
-    )
+    assert result.returncode == 0
+    assert "recorded press.mcap: to compute it again: palpate replay press.mcap" in result.stdout
     return folder / "press.mcap"
 
 
@@ -84,6 +83,9 @@ def test_files_that_cannot_be(recorded, block, shared_cache, tmp_path):
     before = recorded.read_bytes()
     refused(run("run", block, "--headless", 0.5, "--record", recorded, cwd=tmp_path), "press.mcap: exists")
     refused(run("run", block, "--headless", 0.5, "--record", "no/a.mcap", cwd=tmp_path), "there is no folder no")
+    refused(run("run", block, "--headless", 0.5, "--record", "a.foo", cwd=tmp_path), "a recording ends in .mcap")
+    for command in ("info", "run"):
+        refused(run(command, recorded, cwd=tmp_path), "press.mcap is a recording: 'palpate replay' shows it")
     refused(run("replay", "none.mcap", cwd=tmp_path), "none.mcap: no such file")
     refused(run("replay", block, cwd=tmp_path), "block.toml: this is no recording")
     assert recorded.read_bytes() == before

@@ -18,6 +18,7 @@ from palpate.cli import app as command_line
 from palpate.cli.bodies import likely_units
 from palpate.cli.run_file import RunOptions, built_from
 from palpate.models import NAMES
+from palpate.scene import Scene
 from palpate.scene.default_radius import default_contact_radius, default_radius
 from palpate.validation.verify import BENCHMARKS
 
@@ -29,7 +30,8 @@ def test_a_bare_surface_runs_with_defaults_that_are_told(tmp_path):
     shutil.copy(BLOCK, tmp_path)
     result = run("run", "block.obj", "--headless", "1", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
-    computed, text, *_ = result.stdout.splitlines()
+    computed, series, text, *_ = result.stdout.splitlines()
+    assert series.startswith("series beyond small strain below spheres of 5 mm")
     # The size is printed before it is written.
     assert computed.startswith("computing 2526 columns: at most 51 MB in the cache")
     assert computed.endswith(", 842 on the surface)")
@@ -38,6 +40,7 @@ def test_a_bare_surface_runs_with_defaults_that_are_told(tmp_path):
         "unit mm (--unit; it may also be cm or in)",
         "z < min + 0.25mm (--fix)",
         "E = 10kPa (-E)",
+        "law neo-hookean",
         "0.45 (--nu)",
     ):
         assert word in text
@@ -73,7 +76,8 @@ def test_the_size_of_a_scene_is_printed_before_it_is_computed(capsys, monkeypatc
 def test_options_of_a_bare_surface_are_those_of_a_scene(capsys, tmp_path):
     options = RunOptions("8mm", "z < min + 1mm", "20kPa", 0.4, "900kg/m3", "mm", "2cm")
     built = built_from(BLOCK, options)
-    assert "by default" not in capsys.readouterr().out
+    # No option chooses it.
+    assert capsys.readouterr().out.endswith("; by default law neo-hookean (a scene may name another)\n")
     (tmp_path / "a.toml").write_text(
         f'[body]\nmesh = "{BLOCK}"\nunit = "mm"\nmax_element_size = "2cm"\n[supports]\nfixed = "z < min + 1mm"\n'
         '[material]\nyoungs_modulus = "20kPa"\npoissons_ratio = 0.4\ndensity = 900\n[tool]\nradius = "8mm"\n'
@@ -86,7 +90,11 @@ def test_options_of_a_bare_surface_are_those_of_a_scene(capsys, tmp_path):
 def test_a_bare_volume_mesh_runs_too(capsys, tmp_path):
     box_mesh().write(tmp_path / "box.vtu", unit="mm")
     built = built_from(tmp_path / "box.vtu", RunOptions())
-    assert "unit mm (--unit;" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "unit mm (--unit;" in printed and "law neo-hookean" in printed
+    # As of a scene without [material].
+    assert built.bodies[0].body.material.law == built.scene.material.law == Scene(body={"model": "beam"}).material.law
+    assert "series beyond small strain below spheres of 5 mm" in printed
     assert built.bodies[0].body.mesh.volume == pytest.approx(0.08 * 0.05 * 0.05)
     with pytest.raises(palpate.MeshError, match="--part, --max-volume-loss and --segment are for files"):
         built_from(tmp_path / "box.vtu", RunOptions(part="all"))
@@ -132,6 +140,27 @@ def test_wrong_options_are_refused_by_name_for_scenes_and_bare_files(options, me
     box_mesh().write(tmp_path / "box.vtu")
     with pytest.raises(palpate.Error):
         built_from(tmp_path / "box.vtu", RunOptions(**options))
+
+
+def test_a_tool_larger_than_the_body_is_refused_before_columns_are_computed(block_green, monkeypatch, tmp_path):
+    def compute(*_, **__):
+        raise AssertionError("computing")
+
+    for place in ("palpate.scene.build.precompute", "palpate.green.precompute"):
+        monkeypatch.setattr(place, compute)
+    box_mesh().write(tmp_path / "box.vtu", unit="m")
+    trimesh.creation.box((0.08, 0.05, 0.05)).export(tmp_path / "box.stl")
+    sources = ('mesh = "box.vtu"\nunit = "m"', 'mesh = "box.stl"\nunit = "m"', f'store = "{block_green.path}"')
+    for number, source in enumerate(sources):
+        supports = "" if "store" in source else '[supports]\nfixed = "z < min + 1mm"\n'
+        (tmp_path / "a.toml").write_text(f"[body]\n{source}\n{supports}[tool]\nradius = 6\n")
+        line = (tmp_path / "a.toml").read_text().count("\n")
+        words = (f"a.toml:{line}: tool.radius is 6 m, more than the longest side of the bodies, 80 mm",)
+        refused(run("info", "a.toml", cwd=tmp_path), *words)
+        if number != 1:
+            refused(run("run", "a.toml", "--headless", "1", cwd=tmp_path), *words)
+    with pytest.raises(palpate.SceneError, match="radius is 6 m, more than the longest side"):
+        built_from(tmp_path / "box.vtu", RunOptions(radius="6m", unit="m"))
 
 
 def test_radii_that_are_not_given_follow_the_body(block_green):

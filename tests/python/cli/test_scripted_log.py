@@ -64,6 +64,7 @@ def test_the_log_is_kept_on_ctrl_c(tmp_path):
     output, complained = child.communicate(timeout=280)
     assert child.returncode == 130, complained
     assert complained.strip().splitlines()[-1] == "palpate: interrupted" and "Traceback" not in complained
+    assert complained.count("interrupted") == 1
     assert "wrote a.csv and .png" in output
     assert sorted(os.listdir(tmp_path)) == ["a.csv", "a.png", "a.toml", "cache"]
     log = read_log(tmp_path / "a.csv")

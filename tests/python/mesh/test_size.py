@@ -48,6 +48,27 @@ def test_a_unit_that_was_given_is_taken_at_its_word(millimetres):
         palpate.TetMesh.read(millimetres / "box.vtu", unit="um")
 
 
+@pytest.mark.parametrize(
+    ("size", "message"),
+    [
+        ("5", r"elements of 5 m \(--max-size, max_element_size\) are larger than the body of 80 x 50 x 50 mm"),
+        ("4m", r"elements of 4 m .* are larger than the body"),
+        # 3.5 V/h^3 of V = 2e-4 m^3.
+        ("0.01mm", r"elements of 0\.01 mm .* would be about 7e\+11, more than 5 million: give at least 0\.519 mm"),
+    ],
+)
+@pytest.mark.parametrize("is_open", [False, True])
+def test_elements_that_do_not_suit_a_body_are_refused(millimetres, size, message, is_open):
+    box = trimesh.creation.box(extents=(0.08, 0.05, 0.05))
+    if is_open:
+        box.update_faces(np.arange(12) > 0)
+        message = message.partition("about")[0]
+    with pytest.raises(palpate.MeshError, match=message):
+        palpate.tetrahedralize(box, size)
+    typed = command("run", "box.stl", "--unit", "mm", "--max-size", size, "--headless", "1", cwd=millimetres)
+    refused(typed, message.partition(" ")[0], "--max-size")
+
+
 def test_commands_ask_in_one_line_and_print_the_size(millimetres):
     asked = command("mesh", "box.stl", "out.vtu", cwd=millimetres)
     assert asked.returncode == 2

@@ -103,6 +103,7 @@ def test_a_command_that_is_interrupted_leaves_the_same_files(store, tmp_path):
     output = process.communicate(timeout=60)[1]
     assert process.returncode == 130, output
     assert "the same command continues" in output and "Traceback" not in output
+    assert output.count("interrupted") == 1
     assert [path.name for path in (tmp_path / "resumed").iterdir()] == ["palpation.partial"]
     for name in ("resumed", "whole"):
         done = subprocess.run([*command, str(tmp_path / name)], capture_output=True, text=True, timeout=120)

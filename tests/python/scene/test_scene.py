@@ -179,7 +179,7 @@ def test_regions_and_loads_of_a_scene(regions_scene):
         ('["4cm"', '["4m"', r"a\.toml:13: region: no element has its centroid in the sphere"),
         ("poissons_ratio = 0.3", "poissons_ratio = 0.5", r"a\.toml:17: region.poissons_ratio: .*less than 0.5"),
         ("mesh_region =", "mesh_regoin =", r"a\.toml:10: unknown key 'region.mesh_regoin'; did you mean 'mesh_region'"),
-        ("[0, 0, -9.81]", "[0, 0]", r"a\.toml:23: loads.gravity has too few entries"),
+        ("[0, 0, -9.81]", "[0, 0]", r"a\.toml:23: loads.gravity has too few entries: it needs 3, got 2"),
         ('"200Pa"', '"200N"', r"a\.toml:26: loads.pressure: unknown unit 'N'"),
         ('on = "x > max - 1e-6"', 'on = "x > max + 1"', r"a\.toml:25: loads: pressure: no face of the surface"),
         ('on = "x > max - 1e-6"', 'on = "x >"', r"a\.toml:25: loads: cannot read the predicate"),

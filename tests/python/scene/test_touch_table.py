@@ -67,7 +67,7 @@ def test_mistakes_are_told_with_their_line(folder, touch, message):
 @pytest.mark.parametrize(
     ("touch", "message"),
     [
-        ('region = "z > 3m"', r"scene.toml:6: touch: touch: no surface node lies in 'z > 3m'"),
+        ('region = "z > 3m"', r"scene.toml:6: touch: no surface node lies in 'z > 3m'"),
         ('region = "z > 3cm"\nfirst = "z < 1cm"', r"scene.toml:6: touch: first: none of its nodes may be touched"),
     ],
 )

@@ -74,7 +74,7 @@ def test_a_hand_in_the_same_scene_feels_the_same_and_in_another_what_it_would_ha
         palpate.rerun(recording, built_of(scene_of(tool={"radius": 0.006}), block, block_green))
 
 
-def test_the_command_ends_as_diff_does(file, recording, slippery, tmp_path, monkeypatch, capsys):
+def test_the_command_ends_as_diff_does(file, recording, slippery, block, block_green, tmp_path, monkeypatch, capsys):
     def command(*words):
         return called(monkeypatch, capsys, "compare", file, *words)
 
@@ -87,6 +87,10 @@ def test_the_command_ends_as_diff_does(file, recording, slippery, tmp_path, monk
     assert (tmp_path / "plots" / "press-slippery.png").stat().st_size > 10_000
     table = command("slippery.mcap")
     assert table.returncode == 1 and f"first difference: tick {data['first']}, " in table.stdout
+    named = scene_of(body={"store": "block.palpate", "name": "Größe"})
+    palpate.Simulation(built_of(named, block, block_green)).play(*path()).save(tmp_path / "named.mcap")
+    assert "body[0].name: not given and Größe" in command("named.mcap").stdout
+    assert '"b": "Größe"' in command("named.mcap", "--json").stdout
     same = command(file)
     assert same.returncode == 0 and "the same bits in all 300 ticks" in same.stdout
     refused(command(), "two recordings, or one and --scene")

@@ -122,6 +122,24 @@ def test_first_there_are_few_controls_one_sentence_and_no_plots(chromium, progra
             assert page.locator(f"#{name}").is_hidden(), name
         sentence = page.get_by_test_id("hint").inner_text().replace("×", "").strip()
         assert sentence.count(".") == 1 and sentence.endswith(".") and "press" in sentence
+        # Who has pressed knows it.
+        press(page, 3)
+        until(page, lambda s: s["contacts"] > 0)
+        assert page.get_by_test_id("hint").is_visible()
+        page.mouse.up()
+        page.get_by_test_id("hint").wait_for(state="hidden")
+
+
+def test_keys_of_the_help_cover_no_text(chromium, program):
+    with first_page(chromium, program, (1280, 800)) as page:
+        page.keyboard.press("?")
+        page.locator("#help-keys").wait_for()
+        caps, texts = (
+            page.eval_on_selector_all(f"#help-keys {part}", "all => all.map(e => e.getBoundingClientRect().toJSON())")
+            for part in ("dt > :last-child", "dd")
+        )
+        assert len(caps) == len(texts) > 10
+        assert all(cap["right"] <= text["left"] for cap, text in zip(caps, texts, strict=True))
 
 
 @pytest.mark.slow

@@ -1,15 +1,23 @@
-// The hint line about mouse controls, until it is dismissed.
+// The hint line about mouse controls, until it is dismissed or its reader has pressed the body.
 
+import type { Store } from "../store";
 import { byId } from "./dom";
 import { writeStored, readStored } from "./storage";
 
 const KEY = "hint-dismissed";
 
-export function showHint(): void {
+export function showHint(store: Store): void {
   const hint = byId("hint");
-  hint.hidden = readStored(KEY) === "1";
-  byId("hint-close").onclick = () => {
+  const dismiss = () => {
     hint.hidden = true;
     writeStored(KEY, "1");
   };
+  hint.hidden = readStored(KEY) === "1";
+  byId("hint-close").onclick = dismiss;
+  let pressed = false;
+  store.subscribe(["pressing"], ({ pressing }) => {
+    // Nothing moves below a press that goes on.
+    if (pressed && !pressing) dismiss();
+    pressed = pressing !== null;
+  });
 }

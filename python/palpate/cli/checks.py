@@ -1,0 +1,111 @@
+"""Checks of files and folders that a command was given, before its work."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from palpate.errors import Error, SceneError, StoreError
+
+if TYPE_CHECKING:
+    from palpate.scene import Scene
+
+
+def require_folder(folder: Path, option: str = "--out") -> None:
+    """Refuse a file where an option names a folder, which may be yet to be made."""
+    for place in (folder, *folder.parents):
+        if place.exists():
+            if not place.is_dir():
+                raise Error(f"{place} is a file: {option} names a folder")
+            return
+
+
+def require_places(record: Path | None, out: Path | None, page: tuple[str, int] | None = None) -> None:
+    """Refuse places where a run cannot leave its recording, its folder of results or its page (host, port)."""
+    if record is not None:
+        require_recordable(record)
+    if out is not None:
+        require_folder(out)
+    if page is not None:
+        from palpate.viewer.addresses import require_free_port
+
+        require_free_port(*page)
+
+
+def require_recordable(file: Path) -> None:
+    """Refuse a file in which a simulation would not record, or one whose ending no command would open again."""
+    from palpate.simulation import require_new_recording
+
+    if file.suffix != ".mcap":
+        raise SceneError(f"--record {file}: a recording ends in .mcap: name it {file.with_suffix('.mcap')}")
+    require_new_recording(file)
+
+
+def require_store_name(file: Path) -> None:
+    """Refuse a name that no command would take for a store."""
+    if file.suffix != ".palpate":
+        raise StoreError(f"--out {file}: a store ends in .palpate: name it {file.with_suffix('.palpate')}")
+
+
+def require_store(file: Path) -> None:
+    """Refuse a file that is missing, or no store."""
+    from palpate.input_file import require_file
+
+    require_file(file, StoreError)
+    if file.suffix != ".palpate":
+        raise StoreError(f"{file} is no store: 'palpate precompute {shlex.quote(str(file))}' makes one (.palpate)")
+
+
+def require_body(file: Path) -> None:
+    """Refuse a file that is missing, or of a kind that holds no body."""
+    from palpate.input_file import require_file
+    from palpate.mesh.files import WRITERS
+    from palpate.mesh.surface_file import SURFACE_ENDINGS
+    from palpate.segmentation.endings import SEGMENTATION_ENDINGS, is_segmentation
+
+    require_file(file, SceneError)
+    if file.suffix.lower() == ".mcap":
+        raise SceneError(f"{file} is a recording: 'palpate replay' shows it, 'palpate export' and 'compare' read it")
+    # Formats of volume meshes and scenes are looked up as they are written.
+    known = (".toml", ".palpate", *WRITERS)
+    if file.suffix in known or file.suffix.lower() in SURFACE_ENDINGS or is_segmentation(file):
+        return
+    surfaces, volumes, maps = (", ".join(endings) for endings in (SURFACE_ENDINGS, WRITERS, SEGMENTATION_ENDINGS))
+    raise SceneError(
+        f"{file}: files of this kind are not read: scenes are .toml, stores .palpate, surfaces {surfaces}, volume "
+        f"meshes {volumes}, label maps {maps}"
+    )
+
+
+def scene_of_file(file: Path) -> Scene:
+    """Scene of a file or a store; SceneError for other files."""
+    from palpate.input_file import require_file
+    from palpate.scene import Scene
+
+    if file.suffix == ".palpate":
+        return Scene.of_store(file)
+    require_file(file, SceneError)
+    if file.suffix != ".toml":
+        raise SceneError(f"{file} is no scene: write one (.toml) that names it in [body], or give a store (.palpate)")
+    return Scene.read(file)
+
+
+def scene_of_name(name: str) -> Scene:
+    """Scene of a file, a store, or a built-in model by its name; SceneError for anything else."""
+    from palpate.models import NAMES
+    from palpate.scene import model_scene
+
+    file = Path(name)
+    if file.exists() or file.suffix:
+        return scene_of_file(file)
+    if name not in NAMES:
+        raise no_such_model(name)
+    return model_scene(name)
+
+
+def no_such_model(name: str) -> SceneError:
+    """Error for what is neither a file nor a model."""
+    from palpate.models import NAMES
+
+    return SceneError(f"{name}: no such file, and no model of that name; models are {', '.join(NAMES)}")
