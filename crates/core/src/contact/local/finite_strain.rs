@@ -8,9 +8,9 @@
 //! dU = int dF dd = 4/3 E* R^3 s^5 (q_1 s/3 + q_2 s^2/3.5 + q_3 s^3/4)
 //! ```
 //!
-//! and continued by its tangent beyond the depths that were computed. On a curved surface it is the same: with the effective radius
-//! in place of `R` forces on domes and hollows of four to six radii are farther from full solutions (docs/accuracy.md). A linear material has `q = 0`. Added to Sneddon's law it keeps
-//! one energy, and its coefficients blend over a surface of several materials.
+//! and continued by its tangent beyond the depths that were computed. A linear material has `q = 0`. Added to Sneddon's law it keeps
+//! one energy, and its coefficients blend over a surface of several materials. On a curved surface it is the same: with the effective
+//! radius in place of `R` forces on domes and in hollows of four to six radii are farther from full solutions.
 //!
 //! A pad on the tool takes a share of the approach. With `E*` of both and `w = E*/E_body*` the body's own depth over its effective
 //! radius is `w^2 d/R`, and a change of its force by `delta` at its own depth changes the whole by `w delta`: `q_k` of the contact is

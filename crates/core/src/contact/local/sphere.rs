@@ -14,7 +14,7 @@
 //! ```
 //!
 //! A sphere of the effective radius `1/(1/R + kappa)` has the same `x^2` in `g`, as in Hertz's theory, but not the others: one
-//! radius deep in a body of four radii it has 9 % less force, and more in a hollow.
+//! radius deep in a dome of four radii it has 6 % less force, and more in a hollow.
 //!
 //! `U` is quadratic in `k`: `u = u_0(x) + k u_1(x) + 8/15 k^2 x^5` over `E* R^3`. Up to `x = 3/5` all are power series in
 //! `y = x^2`: the closed forms cancel where the contact is shallow. Deeper, the parameter solved for is `t = artanh x`, not `a`:
@@ -257,7 +257,7 @@ mod tests {
         }
     }
 
-    /// Where shallow, a sphere of the effective radius; one radius deep on a dome of four radii that has 10 % less force.
+    /// Where shallow, a sphere of the effective radius; one radius deep on a dome of four radii that has 6 % less force.
     #[test]
     fn a_curved_surface_counts_by_its_shape_not_by_the_effective_radius() {
         for pair in pairs() {
