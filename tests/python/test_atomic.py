@@ -54,8 +54,9 @@ def test_what_is_no_regular_file_is_not_replaced(tmp_path, strange):
 
 def test_commands_refuse_what_is_no_regular_file(mesh_file, strange):
     make = ("precompute", "box.vtu", "--fix", "z < 1mm", "-o")
-    refused(run(*make, "pipe", cwd=mesh_file), "pipe is a pipe")
-    (mesh_file / "pipe.vtu").symlink_to("pipe")
+    for name in ("pipe.palpate", "pipe.vtu"):
+        (mesh_file / name).symlink_to("pipe")
+    refused(run(*make, "pipe.palpate", cwd=mesh_file), "pipe.palpate is a pipe")
     refused(run("mesh", "box.vtu", "pipe.vtu", cwd=mesh_file), "pipe.vtu is a pipe")
     body = palpate.Body(box_mesh(cells=(2, 2, 2)), material=palpate.Material(1e4, 0.4), fixed=[0, 1, 2, 3])
     with pytest.raises(palpate.StoreError, match="socket is a socket"):

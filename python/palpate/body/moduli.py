@@ -14,8 +14,9 @@ def surface_moduli(body: Body) -> tuple[np.ndarray, np.ndarray]:
     Of the modulus it is the harmonic mean of the elements around: beside a stiffer part the softer one yields.
     """
     young, poisson = body.element_materials[:, :2].T
-    inverse, ratio = _at_surface_nodes(body, np.stack([1.0 / young, poisson], axis=1)).T
-    return 1.0 / inverse, np.ascontiguousarray(ratio)
+    # Over the largest, so that a body of one material keeps its modulus to the bit.
+    softness, ratio = _at_surface_nodes(body, np.stack([young.max() / young, poisson], axis=1)).T
+    return young.max() / softness, np.ascontiguousarray(ratio)
 
 
 def surface_strain_terms(body: Body) -> np.ndarray:

@@ -138,7 +138,7 @@ def deepest_without_force(crossing: Crossing, path: np.ndarray, forces: np.ndarr
 
 # The blade bends aside by more than the tool's radius and springs back, as `spring_of_blade` says too: how many times
 # more than allowed a force may jump then, within so many metres of the path from where the tip alone springs.
-SPRINGS = {("ridge", 30, "capsule", "along"): 3}
+SPRINGS = {("ridge", 30, "capsule", "along"): 3.3}
 AROUND_SPRING = 0.6e-3
 
 

@@ -18,7 +18,7 @@ use crate::tensor::outer;
 use crate::{Error, Result};
 
 /// Extent of a capsule across its axis that counts, over that along it.
-const UPRIGHT_EXTENT: f64 = 0.02;
+const UPRIGHT_EXTENT: f64 = 2e-3;
 
 /// Shape of a tool.
 #[derive(Clone, Debug)]
