@@ -128,7 +128,7 @@ def test_of_100_cases_90_intervals_cover_the_modulus(block_file, proportional):
 def test_two_layers_are_told_apart_where_the_tool_feels_both(block_file):
     truth = scene(block_file, "20kPa", SOFT_TOP.format("6kPa"))
     start = scene(block_file, "10kPa", SOFT_TOP.format("10kPa"))
-    found = palpate.fit(start, synthetic(truth, depth=0.008), hold=["poissons_ratio"])
+    found = palpate.fit(start, synthetic(truth, depth=0.008, noise=0.01), hold=["poissons_ratio"])
     soft, hard = found["region.0.youngs_modulus"], found["material.youngs_modulus"]
     assert soft.fitted and soft.low <= 6e3 <= soft.high and soft.value == pytest.approx(6e3, rel=0.05)
     assert hard.fitted and hard.low <= 20e3 <= hard.high and hard.value == pytest.approx(20e3, rel=0.25)
