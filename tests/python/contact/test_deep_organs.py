@@ -14,8 +14,7 @@ from scipy.optimize import nnls
 
 import palpate
 from palpate.mesh.triangles import node_normals
-from palpate.scene import BuiltScene
-from palpate.validation.verify.contact.loop import UNLIMITED, sphere
+from palpate.validation.verify.contact.loop import loop_of, sphere
 
 # Nodes of the built-in kidney at which the force was lost, the last two in the hollow of its hilum; R, m.
 NODES, RADIUS = (364, 2024, 2602, 2721, 277, 2050), 8e-3
@@ -48,12 +47,9 @@ def place_of(node: int, law: str) -> tuple[palpate.Body, palpate.GreensFunction,
 def pressed(node: int, law: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Depths, m, and forces (n, 3), N, of a press along the node's normal by 20 um a tick; and that normal."""
     body, green, place, normal = place_of(node, law)
-    scene = palpate.Scene(
-        body={"model": "kidney"}, tool=[sphere(RADIUS, 0.0)], device=UNLIMITED, view={"strain_limit": 0.0}
-    )
     down = np.arange(-START, DEEP * RADIUS, TICK)
     path = place + (RADIUS - down)[:, None] * normal
-    forces = palpate.Simulation(BuiltScene.of(scene, body, green)).play(path).computed_forces
+    forces = loop_of(body, green, [sphere(RADIUS)]).play(path).computed_forces
     return down, forces, normal
 
 

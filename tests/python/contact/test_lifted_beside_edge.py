@@ -11,9 +11,8 @@ import itertools
 import numpy as np
 
 import palpate
-from palpate.scene import BuiltScene
-from palpate.simulation import Simulation
-from palpate.validation.verify.contact.loop import UNLIMITED, sphere
+from palpate.validation.verify.contact.loop import loop_of, sphere, straight
+from palpate.validation.verify.contact.measures import given_out
 from palpate.validation.verify.grids import box
 
 RADIUS, DEPTH, STEP, SIDE = 0.015, 1.5e-3, 2e-5, 0.08
@@ -26,21 +25,18 @@ JUMP, GIVEN = 0.05, 3e-3
 def way(corners: list[tuple[float, float]]) -> np.ndarray:
     """Path through places (x, y), m."""
     at = np.array([(x, y, HEIGHT) for x, y in corners])
-    steps = [np.linspace(a, b, int(np.linalg.norm(b - a) / STEP) + 1)[1:] for a, b in itertools.pairwise(at)]
-    return np.concatenate([at[:1], *steps])
+    return np.concatenate([at[:1], *(straight(start, end, STEP)[1:] for start, end in itertools.pairwise(at))])
 
 
 def test_a_contact_that_has_been_shortened_does_not_begin_anew_on_lifting():
     mesh = box((10, 10, 7), (SIDE, SIDE, 0.05), quadratic=True)
     body = palpate.Body(mesh, material=palpate.Material(10e3, 0.45), fixed=lambda at: at[:, 2] < 1e-9)
     green = palpate.precompute(body, touch=lambda at: at[:, 0] > 0.04, progress=False)
-    table = {"name": "body", "model": "liver"}  # the table asks for a source; the body is given
-    scene = palpate.Scene(body=table, tool=[sphere(RADIUS, 0.0)], device=UNLIMITED, view={"strain_limit": 0.0})
     high, low = SIDE + RADIUS + 5e-4, SIDE + RADIUS - DEPTH
     path = way([(high, BEGIN), (low, BEGIN), (low, END), (high, END), (high, BEGIN)])
-    forces = Simulation(BuiltScene.of(scene, body, green)).play(path).computed_forces
+    forces = loop_of(body, green, [sphere(RADIUS)]).play(path).computed_forces
     largest = np.linalg.norm(forces, axis=1).max()
     assert largest > 0.05
     assert np.linalg.norm(np.diff(forces, axis=0), axis=1).max() < JUMP * largest
-    done = np.cumsum(-0.5 * np.einsum("tc,tc->t", forces[1:] + forces[:-1], np.diff(path, axis=0)))
-    assert -done[-1] < GIVEN * done.max()
+    given, most = given_out(path[None], forces[None])
+    assert given[0] < GIVEN * most[0]

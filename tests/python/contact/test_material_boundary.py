@@ -13,9 +13,8 @@ import numpy as np
 import pytest
 
 import palpate
-from palpate.scene import BuiltScene
 from palpate.simulation import Simulation
-from palpate.validation.verify.contact.loop import UNLIMITED, sphere, straight
+from palpate.validation.verify.contact.loop import loop_of, sphere, straight
 from palpate.validation.verify.grids import box
 
 RADIUS, DEPTHS, START, TICK = 6e-3, np.array([0.5e-3, 1e-3, 1.5e-3]), 0.2e-3, 1e-5
@@ -32,8 +31,8 @@ ALLOWED = {0.021: 0.16, 0.0235: 0.33, 0.029: 0.29}
 
 
 @cache
-def built(contrast: float, cells: tuple[int, int, int]) -> BuiltScene:
-    """Block of two layers, the upper one stiffer, whose side face may be touched."""
+def loop(contrast: float, cells: tuple[int, int, int]) -> Simulation:
+    """Loop of a block of two layers, the upper one stiffer, whose side face may be touched."""
     mesh = box(cells, SIZE, quadratic=True)
     upper = mesh.nodes[mesh.tets[:, :4]].mean(axis=1)[:, 2] > BOUNDARY
     mesh = palpate.TetMesh(mesh.nodes, mesh.tets, regions=upper.astype(int))
@@ -41,15 +40,13 @@ def built(contrast: float, cells: tuple[int, int, int]) -> BuiltScene:
     body = palpate.Body(mesh, material=material, fixed=lambda at: at[:, 2] < 1e-9)
     touched = lambda at: (at[:, 0] < 0.045) & (np.abs(at[:, 1] - 0.041) < 0.036)  # noqa: E731
     green = palpate.precompute(body, touch=touched, progress=False)
-    table = {"name": "body", "model": "liver"}  # the table asks for a source; the body is given
-    scene = palpate.Scene(body=table, tool=[sphere(RADIUS, 0.0)], device=UNLIMITED, view={"strain_limit": 0.0})
-    return BuiltScene.of(scene, body, green)
+    return loop_of(body, green, [sphere(RADIUS)])
 
 
 def pressed(contrast: float, cells: tuple[int, int, int], height: float) -> tuple[np.ndarray, np.ndarray]:
     """Depths, m, and forces, N, of a sphere pressed into the side face."""
     path = straight((-RADIUS - START, 0.041, height), (DEPTHS[-1] - RADIUS, 0.041, height), TICK)
-    forces = Simulation(built(contrast, cells)).play(path).computed_forces
+    forces = loop(contrast, cells).play(path).computed_forces
     return path[:, 0] + RADIUS, -forces[:, 0]
 
 

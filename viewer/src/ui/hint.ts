@@ -16,7 +16,7 @@ export function showHint(store: Store): void {
   byId("hint-close").onclick = dismiss;
   let pressed = false;
   store.subscribe(["pressing"], ({ pressing }) => {
-    // Nothing moves below a press that goes on.
+    // While the tool presses, nothing on the page moves.
     if (pressed && !pressing) dismiss();
     pressed = pressing !== null;
   });

@@ -21,7 +21,7 @@ use crate::{Error, Result};
 
 /// Most nodes a patch of the servo may have: its 3x3 compliance costs the square of it, once a contact.
 pub const MAX_PATCH_NODES: usize = 256;
-/// Cosine of the angle between normals from which a patch goes on: none goes round a right angle, whatever the rounding.
+/// Least cosine between the normals of a patch's middle and of a triangle in it. Zero would leave right angles to rounding.
 const FACING: f64 = 1e-6;
 
 /// The nodes under a contact and their weights.

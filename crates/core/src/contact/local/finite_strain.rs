@@ -103,10 +103,6 @@ mod tests {
     const RADIUS: f64 = 0.01;
     const MODULUS: f64 = 12.5e3;
 
-    fn on_plane(radius: f64) -> SphereOnSurface {
-        SphereOnSurface { radius, curvature: 0.0 }
-    }
-
     /// Forces of a neo-Hookean half-space (E = 10 kPa, nu = 0.45) under a sphere of 10 mm, N, by full Newton's method on 9-node
     /// elements (`benches/strain`).
     #[test]
@@ -116,7 +112,7 @@ mod tests {
         for (millimetres, newtons) in [(1.0, 0.05193), (2.0, 0.14469), (5.0, 0.54750), (10.0, 1.43029), (15.0, 2.38812)]
         {
             let d: f64 = 1e-3 * millimetres;
-            let linear = indent_sphere(d, on_plane(RADIUS), modulus);
+            let linear = indent_sphere(d, SphereOnSurface::on_plane(RADIUS), modulus);
             let force = linear.corrected(&correct_sphere(d, RADIUS, modulus, &terms)).force;
             assert!((force / newtons - 1.0).abs() < 4e-3, "{millimetres} mm: {force} N");
             assert!(d < 3e-3 || (linear.force / newtons - 1.0).abs() > 2e-2, "the linear law at {millimetres} mm");
@@ -130,8 +126,9 @@ mod tests {
         let off = |terms: &StrainTerms| {
             let error = |(d, newtons): (f64, f64)| {
                 let modulus = 1.0 / (1.0 - 0.3 * 0.3);
-                let force =
-                    indent_sphere(d, on_plane(1.0), modulus).corrected(&correct_sphere(d, 1.0, modulus, terms)).force;
+                let force = indent_sphere(d, SphereOnSurface::on_plane(1.0), modulus)
+                    .corrected(&correct_sphere(d, 1.0, modulus, terms))
+                    .force;
                 (force / newtons - 1.0).abs()
             };
             [(0.2, 0.132877), (0.5, 0.514701), (0.8, 1.012844), (1.0, 1.383851)]
@@ -155,7 +152,7 @@ mod tests {
             let terms = strain_terms(&law, 0.4);
             for (d, newtons) in [0.3, 0.9, 1.5].into_iter().zip(forces) {
                 let modulus = 1.0 / (1.0 - 0.4 * 0.4);
-                let linear = indent_sphere(d, on_plane(1.0), modulus);
+                let linear = indent_sphere(d, SphereOnSurface::on_plane(1.0), modulus);
                 let force = linear.corrected(&correct_sphere(d, 1.0, modulus, &terms)).force;
                 assert!((force / newtons - 1.0).abs() < 1.5e-2, "{law:?} {d}: {force} N for {newtons} N");
             }
@@ -187,7 +184,7 @@ mod tests {
     fn the_whole_is_monotonic() {
         let mut before = 0.0;
         for depth in (1..=2000).map(|k| RADIUS * 0.005 * f64::from(k)) {
-            let whole = indent_sphere(depth, on_plane(RADIUS), MODULUS)
+            let whole = indent_sphere(depth, SphereOnSurface::on_plane(RADIUS), MODULUS)
                 .corrected(&correct_sphere(depth, RADIUS, MODULUS, &TERMS));
             assert!(whole.force > before && whole.stiffness > 0.0, "{depth}");
             before = whole.force;

@@ -47,6 +47,12 @@ pub struct SphereOnSurface {
 }
 
 impl SphereOnSurface {
+    /// A sphere of `radius`, m, on a plane.
+    #[cfg(test)]
+    pub fn on_plane(radius: f64) -> Self {
+        Self { radius, curvature: 0.0 }
+    }
+
     /// Radius of the sphere on a plane that has the same gap near the contact, m.
     pub fn effective_radius(&self) -> f64 {
         1.0 / (1.0 / self.radius + self.curvature)

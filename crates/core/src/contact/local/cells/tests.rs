@@ -59,10 +59,6 @@ fn near(value: f64, expected: f64, tolerance: f64) -> bool {
     (value / expected - 1.0).abs() < tolerance
 }
 
-fn on_plane(radius: f64) -> SphereOnSurface {
-    SphereOnSurface { radius, curvature: 0.0 }
-}
-
 #[test]
 fn a_sphere_is_sneddons() {
     let shape = ToolShape::sphere(0.01).unwrap();
@@ -71,7 +67,7 @@ fn a_sphere_is_sneddons() {
     {
         for depth in [1e-5, 5e-4, 2e-3, 5e-3] {
             let contact = cold(&CellProblem { resolution, ..pressed(&shape, DVec3::ZERO, depth) });
-            let sphere = indent_sphere(depth, on_plane(0.01), MODULUS);
+            let sphere = indent_sphere(depth, SphereOnSurface::on_plane(0.01), MODULUS);
             assert!(near(contact.force.z, sphere.force, tolerance), "{resolution:?} {depth}: {contact:?} {sphere:?}");
             assert!(near(contact.energy, sphere.energy, tolerance), "{resolution:?} {depth}");
             // Cells at the rim count as whole.
@@ -449,7 +445,7 @@ fn a_capsule_on_its_end_is_a_sphere() {
     let shape = ToolShape::capsule(0.004, 0.010).unwrap();
     for tilt in [0.0, 5e-4, 2e-3, 0.05, 0.5] {
         let contact = cold(&pressed(&shape, DVec3::new(tilt, 0.3 * tilt, 0.4), 1e-3));
-        let sphere = indent_sphere(1e-3, on_plane(0.004), MODULUS);
+        let sphere = indent_sphere(1e-3, SphereOnSurface::on_plane(0.004), MODULUS);
         assert!(near(contact.force.z, sphere.force, 0.004), "{tilt}");
         assert!(contact.torque.length() < 1e-6 * 0.004 * sphere.force, "{tilt}: {}", contact.torque);
     }

@@ -57,19 +57,29 @@ pub struct SolvedContacts<'a> {
     pub positions: &'a [DVec3],
 }
 
+/// Whether the foot of a contact follows a sphere from tick to tick.
+fn foot_is_followed(model: &Model, contact: &Contact) -> bool {
+    let (local, tool) = (&contact.local, &model.tools[contact.tool]);
+    !(local.is_fading || local.is_new || tool.shape.needs_cells() || share_of_contact(model, contact) == 1.0)
+}
+
+/// Whether a foot has gone round a sharp edge, as that of a tool does that snaps over one.
+fn has_rounded_edge(model: &Model, contact: &Contact, foot: &FootPoint) -> bool {
+    let edges = model.convex_edges[contact.tool][contact.body].as_deref();
+    edges.is_some_and(|edges| edges.are_beside_one(&contact.local.foot, foot))
+}
+
 /// Whether a foot has moved much farther than its tool, or to another side.
 pub fn foot_has_jumped(model: &Model, contact: &Contact, response: &LocalResponse, place: DVec3) -> bool {
-    let (local, tool) = (&contact.local, &model.tools[contact.tool]);
-    if local.is_fading || local.is_new || tool.shape.needs_cells() || share_of_contact(model, contact) == 1.0 {
+    if !foot_is_followed(model, contact) {
         return false;
     }
+    let (local, tool) = (&contact.local, &model.tools[contact.tool]);
     let travel = place.distance(local.relative_position);
     let has_jumped = response.foot.position.distance(local.foot.position)
         > JUMP_RATIO * travel + JUMP_DISTANCE * tool.radius
         || response.foot.normal.dot(local.foot.normal) < SAME_SIDE;
-    // A tool that snaps over a sharp edge has gone round it.
-    let edges = model.convex_edges[contact.tool][contact.body].as_deref();
-    has_jumped && !edges.is_some_and(|edges| edges.are_beside_one(&local.foot, &response.foot))
+    has_jumped && !has_rounded_edge(model, contact, &response.foot)
 }
 
 /// Starts the fading of contacts whose feet have jumped, and begins their replacements. Returns whether there were any.
@@ -158,14 +168,11 @@ pub fn fix_snapping_contacts(model: &Model, state: &mut State, solved: SolvedCon
     for (a, &slot) in slots.iter().enumerate() {
         let contact = &state.contacts.slots[slot];
         let (local, tool) = (&contact.local, &model.tools[contact.tool]);
-        let new = local.is_new || local.is_fading || local.force == DVec3::ZERO;
-        if new || tool.shape.needs_cells() || share_of_contact(model, contact) == 1.0 {
+        if local.force == DVec3::ZERO || !foot_is_followed(model, contact) {
             continue;
         }
         let snap = solved.positions[a].distance(local.relative_position) - local.way.length();
-        let edges = model.convex_edges[contact.tool][contact.body].as_deref();
-        let rounds = edges.is_some_and(|edges| edges.are_beside_one(&local.foot, &solved.responses[a].foot));
-        if snap > LONGEST_SNAP * tool.radius && !rounds {
+        if snap > LONGEST_SNAP * tool.radius && !has_rounded_edge(model, contact, &solved.responses[a].foot) {
             fix_on_plane(tool, &mut state.contacts.slots[slot], 0.0);
             any = true;
         }

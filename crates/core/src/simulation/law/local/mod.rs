@@ -307,7 +307,7 @@ impl Law for Local {
 
     fn store_entry_depth(&self, _model: &Model, state: &mut State, contact: &Contact) {
         let entry = &mut state.tools[contact.tool].entry[contact.body];
-        // One that began deeper than its tool is now goes on from there.
+        // The next contact begins no higher than this one: its approach may have been reduced.
         entry.previous = contact.depth.max(0.0);
         entry.threshold = entry.threshold.max(contact.local.entry_depth);
     }

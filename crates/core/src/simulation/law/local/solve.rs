@@ -121,11 +121,10 @@ pub fn local_forces(model: &Model, state: &mut State, mut memory: TickMemory<'_>
         }
         let (responses, positions) = (&memory.local.responses, &memory.local.positions);
         let solved = SolvedContacts { responses, positions };
-        if !last && fix_snapping_contacts(model, state, solved, slots) {
-            last = true;
-            continue;
-        }
-        if last || !replace_jumped_contacts(model, state, solved, slots) {
+        let changed = !last
+            && (fix_snapping_contacts(model, state, solved, slots)
+                || replace_jumped_contacts(model, state, solved, slots));
+        if !changed {
             let energy = observe_energy(model, state, memory.local, slots, body);
             if last || !remove_energy_surplus(model, state, memory.local, slots, energy) {
                 commit_energy(state, body);
