@@ -26,7 +26,7 @@ BEAM = (0.1, 0.02, 0.02)
 DEPTHS = np.array([5.0, 10.0, 14.0, 20.0]) * 1e-3
 FORCES = np.array([3.959e-3, 8.159e-3, 1.148e-2, 1.604e-2])
 # Its contact on elements of 5 mm is too stiff by about that.
-ALLOWED = 3.5e-2
+ALLOWED = 3.7e-2
 
 
 def cantilever(law: str) -> palpate.Body:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benches.strain.beside import pressed
+from benches.strain.bodies import cuboids
 from benches.strain.cylinders import RADIUS, references
 from palpate.simulation import Simulation
 
@@ -51,10 +53,21 @@ def test_a_plate_that_hardens_is_followed_to_one_and_a_half_thicknesses(tmp_path
     (plate,) = (body for body in references(0.006) if body.name == "plate")
     forces, stated = plate.pressed(tmp_path)
     errors = np.abs(forces / plate.forces - 1.0)
-    assert errors[:3].max() < 0.04
-    assert errors.max() < 0.075
+    assert errors.max() < 0.03
     assert (errors < stated).all()
-    assert stated.max() < 0.16
+    assert stated.max() < 0.13
+    for factor in (0.95, 1.05):
+        assert np.abs(factor * forces / plate.forces - 1.0).max() > 0.03
+
+
+@pytest.mark.slow
+def test_a_plate_that_is_held_at_two_sides_is_followed_to_one_and_a_half_thicknesses(tmp_path):
+    """With a cubic spring from the series of a wide patch it would be 14 % too stiff."""
+    (plate,) = (body for body in cuboids() if body.name == "plate at two sides")
+    forces, stated = pressed(plate, "neo-hookean", True, tmp_path)
+    errors = np.abs(forces / plate.full() - 1.0)
+    assert errors.max() < 0.035
+    assert (errors < stated).all()
 
 
 @pytest.mark.parametrize("name", ["dome 0.45", "hollow 0.45", "dome 0.3", "hollow 0.3"])
@@ -75,7 +88,7 @@ def test_a_glued_layer_has_the_force_of_a_full_solution(thickness, tmp_path):
     forces, stated = layer.pressed(tmp_path)
     errors = np.abs(forces / layer.forces - 1.0)
     # To 30 % of the thickness.
-    assert errors[:3].max() < (0.05 if thickness == "0.01" else 0.02)
+    assert errors[:3].max() < (0.06 if thickness == "0.01" else 0.02)
     assert (errors < stated).all()
 
 
@@ -88,9 +101,9 @@ def test_a_round_ellipsoid_has_the_force_and_the_work_of_a_sphere(tmp_path):
     recording = Simulation(built).play(path)
     contacts = recording.contacts
     linear_force = 0.6774 * 1.045
-    pressed = -contacts["force"][contacts["tick"] == 119][0, 2]
+    force = -contacts["force"][contacts["tick"] == 119][0, 2]
     # Sneddon's force is 4 to 5 % too large there.
-    assert abs(pressed / body.forces[1] - 1.0) < 0.03 < abs(linear_force / body.forces[1] - 1.0)
+    assert abs(force / body.forces[1] - 1.0) < 0.03 < abs(linear_force / body.forces[1] - 1.0)
     forces = -recording.forces
     work = np.cumsum((0.5 * (forces[1:] + forces[:-1]) * np.diff(path, axis=0)).sum(axis=1))
     assert abs(work[-1]) < 2e-3 * work.max()

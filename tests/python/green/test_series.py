@@ -94,8 +94,8 @@ def test_places_near_a_point_come_first_and_give_the_same_bits(job, whole):
         file.compute(job.problem, stop)
     begun = file.load()
     if begun is not None and not begun.is_complete:
-        known = begun.positions[begun.fields[:, 6] > 0.0]
-        assert np.linalg.norm(known - corner, axis=1).max() < 0.09
+        distances = np.linalg.norm(begun.positions - corner, axis=1)
+        assert np.median(distances[begun.fields[:, 6] > 0.0]) < 0.8 * np.median(distances)
     assert same(file.compute(job.problem), whole)
 
 
@@ -201,7 +201,7 @@ def _child_of(pid: int) -> int:
 
 def test_a_plan_counts_the_series(solved, job, whole):
     body, _ = solved
-    planned = palpate.plan(body, path=job.store, radii=[RADIUS, 2 * RADIUS])
+    planned = palpate.plan(body, path=job.store, radii=[RADIUS, 4 * RADIUS])
     near, far = planned.series
     assert (near.radius, near.places, near.missing) == (RADIUS, whole.places, whole.places)
     assert far.places < near.places and 0 < far.seconds < near.seconds

@@ -52,7 +52,7 @@ use crate::mesh::{Faces, Surface};
 use crate::tensor::{outer, symmetric};
 
 /// `k`.
-const HALF_SPACE: f64 = 0.766_544;
+pub(crate) const HALF_SPACE: f64 = 0.766_544;
 /// `b` over the mean spacing of nodes around: at 2 the ripple of a sliding contact is 1 %, at 3 it is 0.03 %.
 const SPACINGS: f64 = 3.0;
 /// The least `b` over that spacing, if a patch is reduced because it would reach outside the touch region.
@@ -70,9 +70,9 @@ const LEAST_APART: f64 = 0.4;
 /// Least `b` over the tool's radius in a body of one material. The error of the elements is a share of `c_half(b)`, so that it would
 /// grow as the mesh is refined if `b` followed the elements alone.
 const EVEN_WIDTH: f64 = 1.1;
-/// How fast the regular part may fall and rise with the square of the contact radius, over `1 / (E* R^3)`: up to `a = R` the
-/// approach then grows with the force by at least half of what it does on the half-space (see [`super::local::Widening`]).
-const WIDENING_RANGE: [f64; 2] = [-0.11, 7.0];
+/// How fast the regular part may fall and rise with the square of the contact radius, over `1 / (E* R^3)` (see
+/// [`super::local::Widening`]).
+const WIDENING_RANGE: [f64; 2] = [-2.0, 7.0];
 /// Share of `c_half(b)` that 10-node elements lack for a patch of `b` of [`SPACINGS`]: a constant, a part that goes with
 /// `1/(1 - 2 nu)`, and the largest of these that counts.
 const LACKING: [f64; 2] = [0.0193, 0.000_22];
@@ -246,6 +246,8 @@ struct Probe<'a> {
     centre: SurfacePoint,
     /// Mean spacing of the nodes around, m.
     spacing: f64,
+    /// From 0 to 1 in a body of one material as thin as a patch is wide.
+    thin: f64,
     /// Radius down to which a patch may be reduced: all nodes of the smallest are touchable.
     least: f64,
     scratch: &'a mut PatchScratch,
@@ -274,7 +276,8 @@ impl Probe<'_> {
         let share = match self.body.green.surface.faces {
             Faces::Quadratic(_) => {
                 let poisson = self.body.moduli.poissons[fan.node as usize];
-                lacking(poisson, wide / self.spacing) * compact(along(compliance) / along(&half_space))
+                let compact = compact(along(compliance) / along(&half_space));
+                lacking(poisson, wide / self.spacing) * compact.max(self.thin)
             }
             Faces::Linear(_) => 0.0,
         };
@@ -293,20 +296,24 @@ fn fan_compliance(
     let fan = &body.smooth.fans()[rank];
     let spacing = body.smooth.spacing_around(fan);
     let least = LEAST_SPACINGS * spacing;
-    let mut probe = Probe { body, centre: centre_of(&body.green.surface, fan), spacing, least, scratch, patch };
+    let mut probe =
+        Probe { body, centre: centre_of(&body.green.surface, fan), spacing, thin: 0.0, least, scratch, patch };
     let floor = match body.moduli.homogeneous {
         true => EVEN_WIDTH * radius,
         false => (SAME_MOMENT * reference_area(radius)).sqrt(),
     };
     let (compliance, width) = probe.compliance((SPACINGS * spacing).max(floor));
+    let share = extrapolated_share(body, rank, width);
+    probe.thin = if body.moduli.homogeneous { share } else { 0.0 };
     let (mut regular, mut widening) = (probe.regular(&compliance, fan, width), 0.0);
     let unit = 1.0 / (body.moduli.plane_strain(fan.node) * radius);
-    let share = extrapolated_share(body, rank, width);
     if share > 0.0 {
-        let (other, wider) = probe.compliance(SECOND_WIDTH * width);
-        let apart = wider * wider - width * width;
-        if apart > LEAST_APART * width * width {
-            let rate = (probe.regular(&other, fan, wider) - regular) * (share / apart);
+        // Of one material a narrower patch, which is closer to a contact.
+        let ratio = if body.moduli.homogeneous { 1.0 / SECOND_WIDTH } else { SECOND_WIDTH };
+        let (other, second) = probe.compliance(ratio * width);
+        let apart = second * second - width * width;
+        if apart.abs() > LEAST_APART * width * width {
+            let rate = (probe.regular(&other, fan, second) - regular) * (share / apart);
             regular += rate * (SAME_MOMENT * reference_area(radius) - width * width);
             let [least, most] = WIDENING_RANGE.map(|bound| bound * unit / (radius * radius));
             widening = (SAME_MOMENT * fan.normal.dot(rate * fan.normal)).clamp(least, most);

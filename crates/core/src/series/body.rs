@@ -27,6 +27,8 @@ pub struct PatchLoad {
     pub weights: Vec<(u32, f64)>,
     /// Direction.
     pub direction: DVec3,
+    /// Mesh node in its middle.
+    pub middle: u32,
 }
 
 /// Weighted displacements under a patch by order.
@@ -36,6 +38,10 @@ pub struct SeriesAt {
     pub displacements: [DVec3; 3],
     /// `U_5` of 1 N, J/N^5.
     pub fifth: f64,
+    /// `U_6` (J/N^6) and `U_7` (J/N^7) of a body that hardens.
+    pub last: [f64; 2],
+    /// `u_1`, `u_2`, `u_3` in the middle of the patch.
+    pub middle: [DVec3; 3],
 }
 
 impl HyperelasticBody {
@@ -72,9 +78,12 @@ impl HyperelasticBody {
         let fifth = elements.third_order(&first, &second, &mut third);
         third.iter_mut().flatten().for_each(|force| *force = -*force);
         self.solve(&mut third, memory);
-        let at = |(k, load): (usize, &PatchLoad)| SeriesAt {
-            displacements: [&first[k], &second[k], &third[k]].map(|field| load.mean_displacement(field)),
-            fifth: fifth[k],
+        let at = |(k, load): (usize, &PatchLoad)| {
+            let fields = [&first[k][..], &second[k], &third[k]];
+            let displacements = fields.map(|field| load.mean_displacement(field));
+            let hardens = displacements[2].dot(load.direction) < 0.0;
+            let last = if hardens { elements.last_orders(fields) } else { [0.0; 2] };
+            SeriesAt { displacements, fifth: fifth[k], last, middle: fields.map(|field| field[load.middle as usize]) }
         };
         loads.iter().enumerate().map(at).collect()
     }

@@ -4,35 +4,44 @@ use glam::DVec3;
 
 use super::body::SeriesAt;
 use crate::contact::SeriesFields;
-use crate::math::cbrt;
+use crate::contact::regular::HALF_SPACE;
+use crate::math::{cbrt, pow};
 
 /// Least part of the compliance at rest that is left where the series ends.
 const LEAST_COMPLIANCE: f64 = 0.2;
-/// `|U_5| / U_2` at which the series of a body that softens ends, and that of a body that hardens: its further orders alternate.
+/// Part of the energy that is left out, over `U_2`, at which the series of a body that softens ends, and that of a body that hardens:
+/// its further orders alternate.
 const LARGEST_REST: [f64; 2] = [0.01, 0.05];
+/// `-e_3/e_2^2` from which the orders four and five count, and from which they count fully.
+const HARD: [f64; 2] = [1.0, 2.0];
+/// The part of a patch's compliance that is not the half-space's, from which a body counts as one that bends, and fully so.
+const BENDS: [f64; 2] = [0.4, 0.8];
+/// Displacement of a half-space in the middle of a patch less the weighted mean, times `E* b`.
+const MIDDLE: f64 = 16.0 / (5.0 * std::f64::consts::PI) - HALF_SPACE;
+/// Largest ratio of displacements of a small contact and of a patch.
+const MOST_NARROWED: f64 = 2.0;
+/// Steps to the coefficients that match the orders four and five.
+const STEPS: usize = 8;
 
-/// Coefficients from a series under a patch that is pressed along `inward`: less the displacements `half_space` (m/N^2, m/N^3) of the
-/// half-space under it, as `U_3 = F^2 b_3 . f` and `U_4 = F^3 b_4 . f`.
-pub fn coefficients(at: &SeriesAt, inward: DVec3, half_space: [f64; 2]) -> SeriesFields {
+/// Coefficients from a series under a patch that is pressed along `inward`: less the displacements `half_space` (m/N, m/N^2, m/N^3) of
+/// the half-space under it, as `U_3 = F^2 b_3 . f` and `U_4 = F^3 b_4 . f`. The first is `1/(E* b)`.
+pub fn coefficients(at: &SeriesAt, inward: DVec3, half_space: [f64; 3]) -> SeriesFields {
     let [first, q2, q3] = at.displacements;
-    let q2 = q2 - inward * half_space[0];
-    let q3 = q3 - inward * half_space[1];
     let compliance = first.dot(inward);
-    let [second, third] = [q2, q3].map(|field| field.dot(inward));
-    let Hardening { share, bending, hardening } = Hardening::new(compliance, [second, third]);
+    let bends = 1.0 - HALF_SPACE * half_space[0] / compliance;
+    let [s1, s3] = narrowed(at, inward, half_space[0], bends);
+    // As far as these are known from plates.
+    let (s4, s5, s6) = (s3 / s1, s3, s3 * s3 / (s1 * s1));
+    let compliance = compliance * s1;
+    let (q2, q3) = (q2 - inward * half_space[1], (q3 - inward * half_space[2]) * s3);
+    let [fourth, fifth, sixth] = [5.0 * at.fifth * s4, 6.0 * at.last[0] * s5, 7.0 * at.last[1] * s6];
+    let orders = [q2.dot(inward), q3.dot(inward), fourth, fifth, sixth].map(|order| order / compliance);
+    let Hardening { bending, hardening, ending } = Hardening::new(orders, bends);
     // In powers of y = F - alpha F^2 + .. in place of F.
-    let q3 = q3 + inward * (2.0 * bending * second);
+    let q3 = q3 + q2.dot(inward) * inward * (2.0 * bending);
     // The gradients of both forms at f = F inward are F^2 (b_3 + 2 (b_3 . n) n) and F^3 (b_4 + 3 (b_4 . n) n).
     let cubic = q2 - inward * (2.0 / 3.0 * q2.dot(inward));
     let quartic = q3 - inward * (0.75 * q3.dot(inward));
-    // The displacement of order four that c_1 y + (1 - share) c_2 y^2 lacks.
-    let square = bending * bending;
-    let fourth = 5.0 * bending * (hardening - square) * compliance;
-    let fourth = fourth + (1.0 - share) * second * (5.0 * square - 2.0 * hardening);
-    let fifth = at.fifth - 0.2 * fourth;
-    let rest = LARGEST_REST[0] + share * (LARGEST_REST[1] - LARGEST_REST[0]);
-    let ending = cbrt(fifth.abs() / (0.5 * rest * compliance));
-    let ending = ending.max(softest(compliance, [2.0 * second, 3.0 * third], share));
     // So far of y.
     let ending = if ending > 0.0 { ending / (1.0 + (bending + hardening / ending) / ending) } else { 0.0 };
     let fields = [cubic.x, cubic.y, cubic.z, quartic.x, quartic.y, quartic.z, ending, hardening, bending];
@@ -40,37 +49,98 @@ pub fn coefficients(at: &SeriesAt, inward: DVec3, half_space: [f64; 2]) -> Serie
     if fields.iter().all(|field| field.is_finite()) { fields } else { SeriesFields::default() }
 }
 
-/// How a body hardens: `F = y + alpha y^2 + kappa y^3`, where `q = c_1 y + (1 - share) c_2 y^2`.
+/// Displacements of the first and third order of a small contact over those of the patch, in a body that hardens as it bends: a plate is
+/// displaced more under a contact than under a wide patch of the same force. The energy `U_k` is a form of degree `k` in the pressure,
+/// and the displacement in the middle has the small contact in place of one of `k` patches: its ratio to the mean counts `k` times. That
+/// of the second order, in which a plate becomes thinner, would make plates that are bent by more than their thickness 4 % too soft.
+fn narrowed(at: &SeriesAt, inward: DVec3, half_space: f64, bends: f64) -> [f64; 2] {
+    let hardens = at.displacements[2].dot(inward) < 0.0;
+    let part = if hardens { rise(bends, BENDS) } else { 0.0 };
+    let ratio = |k: usize| at.middle[k].dot(inward) / at.displacements[k].dot(inward);
+    let own = MIDDLE * half_space / at.displacements[0].dot(inward);
+    let ratios = [(ratio(0) - own).powi(2), ratio(2).powi(4)];
+    ratios.map(|ratio| if ratio.is_finite() { 1.0 + part * (ratio.clamp(1.0, MOST_NARROWED) - 1.0) } else { 1.0 })
+}
+
+/// How a body hardens: `F = y + alpha y^2 + kappa y^3`, where `q/c_1 = y + (e_2 + alpha) y^2 + (e_3 + 2 alpha e_2 + kappa) y^3`.
 struct Hardening {
-    share: f64,
     /// `alpha`, 1/N.
     bending: f64,
     /// `kappa`, 1/N^2.
     hardening: f64,
+    /// One over the `y` at which the series ends, 1/N.
+    ending: f64,
 }
 
 impl Hardening {
-    /// Of the displacement `c_1 F + c_2 F^2 + c_3 F^3`. `alpha = -share c_2/c_1`, and the cubic terms cancel for
-    /// `kappa = -(c_3 + 2 alpha c_2)/c_1`. Both are zero for a body that softens, `c_3 >= 0`. The share is 1 where `-c_3/c_1` is at least
-    /// `(c_2/c_1)^2`: then the force as a function of the displacement is a cubic polynomial, `c_1 y = q`. As
-    /// `kappa >= 2 share (c_2/c_1)^2`, the force always grows with `y`.
-    fn new(compliance: f64, [second, third]: [f64; 2]) -> Self {
-        let (relative, hardens) = (second / compliance, (-third / compliance).max(0.0));
-        let square = relative * relative;
+    /// Of the displacement `q/c_1 = F + e_2 F^2 + .. + e_6 F^6`, of which the part `bends` is not the half-space's.
+    fn new(orders: [f64; 5], bends: f64) -> Self {
+        let (first, matched) = (Self::of_three(orders), Self::of_five(orders));
+        let [second, third, ..] = orders;
+        let part = rise(bends, BENDS) * if third < 0.0 { rise(-third / (second * second), HARD) } else { 0.0 };
+        match matched {
+            Some(matched) if part > 0.0 => {
+                let mixed = |a: f64, b: f64| a + part * (b - a);
+                let [bending, hardening] =
+                    [mixed(first.bending, matched.bending), mixed(first.hardening, matched.hardening)];
+                Self { bending, hardening, ending: mixed(first.ending, matched.ending) }
+            }
+            _ => first,
+        }
+    }
+
+    /// `alpha = -share e_2`, and the cubic terms cancel for `kappa = -(e_3 + 2 alpha e_2)`. Both are zero for a body that softens,
+    /// `e_3 >= 0`. The share is 1 where `-e_3` is at least `e_2^2`: then the force as a function of the displacement is a cubic
+    /// polynomial, `c_1 y = q`. As `kappa >= 2 share e_2^2`, the force always grows with `y`.
+    fn of_three([second, third, fourth, ..]: [f64; 5]) -> Self {
+        let hardens = (-third).max(0.0);
+        let square = second * second;
         let share = if hardens > 0.0 { (hardens / square).min(1.0) } else { 0.0 };
-        Self { share, bending: -share * relative, hardening: hardens + 2.0 * share * square }
+        let (bending, hardening) = (-share * second, hardens + 2.0 * share * square);
+        let lacks = fourth + second * (bending * bending + 2.0 * hardening) + 3.0 * bending * third;
+        let rest = LARGEST_REST[0] + share * (LARGEST_REST[1] - LARGEST_REST[0]);
+        let ending =
+            cbrt((lacks / 2.5).abs() / rest).max(softest([2.0 * (1.0 - share) * second, 3.0 * third.max(0.0)]));
+        Self { bending, hardening, ending }
+    }
+
+    /// The `alpha` and `kappa` that have the orders four and five too: both polynomials in `y` are then of the third degree, as of a
+    /// plate that hardens less than the cube of its displacement. None where one of them turns back.
+    fn of_five([second, third, fourth, fifth, sixth]: [f64; 5]) -> Option<Self> {
+        let (mut bending, mut hardening) = (0.0, 0.0);
+        for _ in 0..STEPS {
+            hardening = -(3.0 * third * bending * bending + 4.0 * bending * fourth + fifth)
+                / (2.0 * second * bending + 3.0 * third);
+            bending = -(fourth + second * (2.0 * hardening + bending * bending)) / (3.0 * third);
+        }
+        let (square, cube) = (second + bending, third + 2.0 * bending * second + hardening);
+        let turns = |second: f64, third: f64| third < 0.0 || 3.0 * third < second * second;
+        if !(bending.is_finite() && hardening.is_finite()) || turns(bending, hardening) || turns(square, cube) {
+            return None;
+        }
+        let (square, products) = (bending * bending, bending * hardening);
+        let lacks = sixth
+            + second * hardening * hardening
+            + third * (square * bending + 6.0 * products)
+            + fourth * (6.0 * square + 4.0 * hardening)
+            + 5.0 * bending * fifth;
+        let ending = pow((lacks / 3.5).abs() / LARGEST_REST[1], 0.2);
+        Some(Self { bending, hardening, ending })
     }
 }
 
 /// One over the `y` from which the compliance along the force is less than a part of what it was; zero if there is none. The energy
-/// is convex up to there. A body that softens has the compliance `c + s_2 y + s_3 y^2` and `y = F`, one that hardens
-/// `c + (1 - share) s_2 y` times a positive factor.
-fn softest(compliance: f64, [second, third]: [f64; 2], share: f64) -> f64 {
-    // In x = 1/y: (1 - part) c x^2 + s_2 x + s_3 = 0, its largest root.
-    let (second, third) = ((1.0 - share) * second, third.max(0.0));
-    let whole = (1.0 - LEAST_COMPLIANCE) * compliance;
+/// is convex up to there. The compliance over that at rest is `1 + s_2 y + s_3 y^2`, times a positive factor in a body that hardens.
+fn softest([second, third]: [f64; 2]) -> f64 {
+    // In x = 1/y: (1 - part) x^2 + s_2 x + s_3 = 0, its largest root.
+    let whole = 1.0 - LEAST_COMPLIANCE;
     let discriminant = second * second - 4.0 * whole * third;
     if discriminant < 0.0 { 0.0 } else { ((discriminant.sqrt() - second) / (2.0 * whole)).max(0.0) }
+}
+
+/// From 0 to 1 between two values.
+fn rise(x: f64, [low, high]: [f64; 2]) -> f64 {
+    ((x - low) / (high - low)).clamp(0.0, 1.0)
 }
 
 #[cfg(test)]
@@ -80,29 +150,44 @@ mod tests {
     #[test]
     fn the_series_ends_where_the_compliance_vanishes() {
         // 1 - 0.4 F reaches 0.2 at F = 2, and 1 - 0.2 F^2 too.
-        assert!((softest(1.0, [-0.4, 0.0], 0.0) - 0.5).abs() < 1e-14);
-        // One that hardens has none, unless the second order softens it.
-        assert_eq!(softest(1.0, [0.0, -0.2], 0.0), 0.0);
-        assert!((softest(1.0, [-0.4, -0.2], 0.0) - 0.5).abs() < 1e-14);
-        assert_eq!(softest(1.0, [0.3, 0.1], 0.0), 0.0);
-        // Nor one whose displacement is y itself.
-        assert_eq!(softest(1.0, [-0.4, -0.2], 1.0), 0.0);
+        assert!((softest([-0.4, 0.0]) - 0.5).abs() < 1e-14);
+        assert!((softest([0.0, -0.2]) - 0.5).abs() < 1e-14);
+        assert_eq!(softest([0.3, 0.0]), 0.0);
     }
 
-    /// The displacement of a cubic spring `F = 2 q - 0.3 q^2 + 5 q^3` up to the third order gives the spring.
+    /// Orders two to six of `q/c_1 = y + b y^2 + g y^3` in powers of `F = y + a y^2 + k y^3`, one after another.
+    fn orders([b, g, a, k]: [f64; 4]) -> [f64; 5] {
+        let product = |x: &[f64; 7], y: &[f64; 7]| -> [f64; 7] {
+            std::array::from_fn(|n| (0..=n).map(|i| x[i] * y[n - i]).sum())
+        };
+        let force = [0.0, 1.0, a, k, 0.0, 0.0, 0.0];
+        let mut powers = vec![force];
+        for n in 1..6 {
+            powers.push(product(&powers[n - 1], &force));
+        }
+        let mut left = [0.0, 1.0, b, g, 0.0, 0.0, 0.0];
+        let mut found = [0.0; 7];
+        for n in 1..7 {
+            found[n] = left[n];
+            let power = powers[n - 1];
+            left.iter_mut().zip(power).for_each(|(x, p)| *x -= found[n] * p);
+        }
+        std::array::from_fn(|n| found[n + 2])
+    }
+
+    /// A spring whose force and displacement are polynomials of the third degree is found from five orders, and a cubic spring from
+    /// three.
     #[test]
-    fn a_cubic_spring_is_found_from_its_series() {
-        let (first, second, third) = (2.0f64, -0.3f64, 5.0f64);
-        let compliance = 1.0 / first;
-        let q2 = -second * compliance.powi(3);
-        let q3 = (2.0 * second * second - first * third) * compliance.powi(5);
-        let found = Hardening::new(compliance, [q2, q3]);
-        assert_eq!(found.share, 1.0);
-        // y = q/c_1.
-        assert!((found.bending / (second * compliance * compliance) - 1.0).abs() < 1e-14);
-        assert!((found.hardening / (third * compliance.powi(3)) - 1.0).abs() < 1e-14);
+    fn a_spring_is_found_from_its_series() {
+        for [b, g, a, k] in [[0.3, 5.0, -0.1, 40.0], [0.1, 0.5, -0.3, 8.0], [0.0, 0.0, -0.2, 3.0]] {
+            let found = Hardening::of_five(orders([b, g, a, k])).expect("a spring");
+            assert!((found.bending - a).abs() < 1e-6 && (found.hardening / k - 1.0).abs() < 1e-6, "{}", found.bending);
+            assert!(found.ending < 0.1 * k.sqrt(), "{}", found.ending);
+        }
+        let found = Hardening::of_three(orders([0.0, 0.0, -0.3, 5.0]));
+        assert!((found.bending + 0.3).abs() < 1e-14 && (found.hardening / 5.0 - 1.0).abs() < 1e-14);
         // One that softens stays a series.
-        let soft = Hardening::new(compliance, [q2, -q3]);
-        assert_eq!([soft.share, soft.bending, soft.hardening], [0.0; 3]);
+        let soft = Hardening::new([0.3, 0.5, 0.0, 0.0, 0.0], 1.0);
+        assert_eq!([soft.bending, soft.hardening], [0.0; 2]);
     }
 }

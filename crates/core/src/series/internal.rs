@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3};
 
 use super::stress::{Gradients, stress};
-use super::truncated::contraction;
+use super::truncated::{DEGREE, contraction};
 use crate::contact::local::StrainLaw;
 use crate::element::{Tet4, Tet10, Tetrahedron, gradients};
 use crate::fem::Isotropic;
@@ -21,19 +21,30 @@ pub struct Elements<'a> {
 impl Elements<'_> {
     /// `r_2` of fields `u_1`, added to the `forces` of each, N.
     pub fn second_order(&self, first: &[Vec<DVec3>], forces: &mut [Vec<DVec3>]) {
-        let fields: Vec<_> = first.iter().map(|first| [&first[..], &[]]).collect();
+        let fields: Vec<_> = first.iter().map(|first| [&first[..], &[], &[]]).collect();
         self.each_stress(&fields, |load, [_, _, second], _, at| at.add_forces(second, &mut forces[load]));
     }
 
     /// `r_3` of fields `u_1`, `u_2`, added to the `forces` of each, N; returns `U_5` of each.
     pub fn third_order(&self, first: &[Vec<DVec3>], second: &[Vec<DVec3>], forces: &mut [Vec<DVec3>]) -> Vec<f64> {
-        let fields: Vec<_> = first.iter().zip(second).map(|(first, second)| [&first[..], &second[..]]).collect();
+        let fields: Vec<_> = first.iter().zip(second).map(|(first, second)| [&first[..], &second[..], &[]]).collect();
         let mut fifth = vec![0.0; first.len()];
-        self.each_stress(&fields, |load, [_, _, _, third, fourth], [h1, h2], at| {
+        self.each_stress(&fields, |load, [_, _, _, third, fourth], [h1, h2, _], at| {
             at.add_forces(third, &mut forces[load]);
             fifth[load] -= at.weight * (contraction(fourth, h1) + 2.0 * contraction(third, h2)) / 5.0;
         });
         fifth
+    }
+
+    /// `U_6` and `U_7` of fields `u_1`, `u_2`, `u_3`.
+    pub fn last_orders(&self, fields: [&[DVec3]; 3]) -> [f64; 2] {
+        let mut found = [0.0; 2];
+        self.each_stress(&[fields], |_, orders: &[DMat3; 7], gradients, at| {
+            let work = |order: usize, by: usize| by as f64 * contraction(&orders[order], gradients[by - 1]);
+            found[0] -= at.weight * (work(5, 1) + work(4, 2)) / 6.0;
+            found[1] -= at.weight * (work(6, 1) + work(5, 2) + work(4, 3)) / 7.0;
+        });
+        found
     }
 
     /// Points of quadrature, at each of which a series is summed.
@@ -52,8 +63,8 @@ impl Elements<'_> {
     /// displacement gradients. An empty field is zero.
     fn each_stress<const O: usize>(
         &self,
-        fields: &[[&[DVec3]; 2]],
-        use_stress: impl FnMut(usize, &[DMat3; O], [&DMat3; 2], &At<'_>),
+        fields: &[[&[DVec3]; DEGREE]],
+        use_stress: impl FnMut(usize, &[DMat3; O], [&DMat3; DEGREE], &At<'_>),
     ) {
         match &self.mesh.tets {
             Tets::Linear(tets) => self.each_stress_of::<Tet4, 4, O>(tets, fields, use_stress),
@@ -64,8 +75,8 @@ impl Elements<'_> {
     fn each_stress_of<E: Tetrahedron<N>, const N: usize, const O: usize>(
         &self,
         tets: &[[u32; N]],
-        fields: &[[&[DVec3]; 2]],
-        mut use_stress: impl FnMut(usize, &[DMat3; O], [&DMat3; 2], &At<'_>),
+        fields: &[[&[DVec3]; DEGREE]],
+        mut use_stress: impl FnMut(usize, &[DMat3; O], [&DMat3; DEGREE], &At<'_>),
     ) {
         for (e, nodes) in tets.iter().enumerate() {
             if self.laws[e] == StrainLaw::Linear {

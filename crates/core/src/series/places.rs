@@ -25,7 +25,7 @@ const THICKNESSES: f64 = 1.5;
 /// Least radius of the patch over the tool's. A patch that stays as wide as the contact has a limit load, which a sphere has not.
 const LEAST_RADII: f64 = 0.9;
 /// Distance of places over the tool's radius: the coefficients are as smooth as the patch is wide.
-const SPACING: f64 = 0.9;
+const SPACING: f64 = 0.7;
 
 /// Where a series is computed.
 struct Place {
@@ -65,7 +65,8 @@ impl SeriesPlan {
             let patch = wide_patch_weights(&surface, &geometry, &centre_of(&surface, at), width, scratch);
             let weights: Vec<_> = patch.iter().map(|&(node, w)| (problem.surface_nodes[node as usize], w)).collect();
             let is_known = width >= LEAST_RADII * radius && !weights.is_empty();
-            is_known.then(|| Place { fan, width, load: PatchLoad { weights, direction: -at.normal } })
+            let middle = problem.surface_nodes[at.node as usize];
+            is_known.then(|| Place { fan, width, load: PatchLoad { weights, direction: -at.normal, middle } })
         };
         let memory = || PatchScratch::new(&surface);
         let places: Vec<Option<Place>> = ordered.into_par_iter().map_init(memory, place).collect();
@@ -108,17 +109,18 @@ impl SeriesPlan {
     }
 
     /// Displacements of the second and third order of a half-space of the material at a place, m/N^2 and m/N^3.
-    fn half_space(&self, place: &Place) -> [f64; 2] {
+    fn half_space(&self, place: &Place) -> [f64; 3] {
         let node = self.problem.surface_nodes[self.smooth.fans()[place.fan].node as usize] as usize;
         let around = &self.elements.1[self.elements.0[node]..self.elements.0[node + 1]];
-        let [mut second, mut third] = [0.0; 2];
+        let [mut first, mut second, mut third] = [0.0; 3];
         for &(element, _) in around {
             let (material, law) = (&self.problem.materials[element as usize], &self.laws[element as usize]);
             let [h2, h3] = half_space_terms(law, material.poissons_ratio);
+            first += (1.0 - material.poissons_ratio.powi(2)) / (material.youngs_modulus * around.len() as f64);
             second += h2 / (material.youngs_modulus.powi(2) * around.len() as f64);
             third += h3 / (material.youngs_modulus.powi(3) * around.len() as f64);
         }
-        [second / place.width.powi(3), third / place.width.powi(5)]
+        [first / place.width, second / place.width.powi(3), third / place.width.powi(5)]
     }
 }
 

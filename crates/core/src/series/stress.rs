@@ -16,7 +16,7 @@ use super::truncated::{DEGREE, Matrix};
 use crate::contact::local::StrainLaw;
 use crate::fem::Isotropic;
 
-/// Displacement gradients of orders 1 and 2.
+/// Displacement gradients of orders 1 to 3.
 pub type Gradients = [DMat3; DEGREE];
 
 /// The first `N` coefficients of the stress, Pa, from order 0 on.
@@ -99,7 +99,7 @@ mod tests {
     fn gradients() -> Gradients {
         let column = |a: f64| DVec3::new(0.3 + a, -0.2 * a, 0.15 - a);
         let matrix = |a: f64| DMat3::from_cols(column(a), column(0.4 * a), column(-0.7 * a + 0.1));
-        [matrix(0.5), matrix(-0.3)]
+        [matrix(0.5), matrix(-0.3), matrix(0.2)]
     }
 
     /// Energy density as the authors print it, Pa.
@@ -126,8 +126,8 @@ mod tests {
         for law in [StrainLaw::NeoHookean, mooney, yeoh] {
             let series: [DMat3; 5] = stress(&law, &material, &gradients());
             let rest = |s: f64| {
-                let [first, second] = gradients();
-                let f = DMat3::IDENTITY + first * s + second * (s * s);
+                let [first, second, third] = gradients();
+                let f = DMat3::IDENTITY + (first + (second + third * s) * s) * s;
                 let sum: DMat3 = series.iter().enumerate().map(|(k, &p)| p * s.powi(k as i32)).sum();
                 let (mut most, h) = (0.0f64, 1e-5);
                 for (row, column) in (0..9).map(|k| (k / 3, k % 3)) {

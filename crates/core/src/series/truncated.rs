@@ -3,7 +3,7 @@
 use glam::DMat3;
 
 /// Degree of the deformation gradients here, which are polynomials: products with higher coefficients are left out.
-pub const DEGREE: usize = 2;
+pub const DEGREE: usize = 3;
 
 /// A number.
 #[derive(Clone, Copy, Debug, PartialEq)]

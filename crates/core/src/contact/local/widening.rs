@@ -9,7 +9,9 @@
 //! U(d) = U_sphere + F dW/dF - W           dU/d(theta) at constant d = dU_sphere/d(theta) - dW/d(theta) at constant F
 //! ```
 //!
-//! so that force, stiffness and the forces along a surface on which anything changes follow from one energy.
+//! so that force, stiffness and the forces along a surface on which anything changes follow from one energy. A negative `kappa` is that
+//! of a body that bends around the tool: it flattens the gap, and the contact grows. It counts up to the force `F_1 = 0.147/(R |kappa|)`,
+//! and beyond that `dW/dF` stays what it is there: the approach grows with the force by more than half of what it does without it.
 
 use super::finite_strain::{StrainCorrection, StrainTerms, correct_sphere};
 use super::sphere::{SphereContact, SphereOnSurface, indent_sphere};
@@ -19,6 +21,10 @@ use crate::math::cbrt;
 const MOST_STEPS: usize = 12;
 /// Relative error of a converged approach.
 const SETTLED: f64 = 1e-13;
+/// `R |kappa| F_1` of a body that bends around the tool.
+const MOST_BENDING: f64 = 0.147;
+/// `R/a_0` of the reference of a tool.
+const REFERENCE: f64 = 2.0;
 
 /// How the regular compliance changes with the contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -73,9 +79,9 @@ impl Widening {
         }
         let (mut growth, radius) = (1.0, pair.effective_radius());
         for _ in 0..MOST_STEPS {
-            let area = hertz_area(sphere.force, radius, effective_modulus);
-            let residual = own + self.rate * sphere.force * (4.0 / 3.0 * area - self.reference) - whole;
-            growth = 1.0 + sphere.stiffness * self.rate * (20.0 / 9.0 * area - self.reference);
+            let change = self.change(sphere.force, radius, effective_modulus);
+            let residual = own + change.displacement - whole;
+            growth = 1.0 + sphere.stiffness * change.slope;
             if residual.abs() <= SETTLED * whole || sphere.force == 0.0 {
                 break;
             }
@@ -93,21 +99,48 @@ impl Widening {
         radius: f64,
         effective_modulus: f64,
     ) -> WidenedContact {
-        let (force, area) = (sphere.force, hertz_area(sphere.force, radius, effective_modulus));
-        let wide = 0.5 * force * force * (area - self.reference);
-        let by_area = self.rate * force * force * area / 3.0;
+        let change = self.change(sphere.force, radius, effective_modulus);
         WidenedContact {
             sphere: SphereContact {
                 stiffness: sphere.stiffness / growth,
-                energy: sphere.energy + self.rate * (force * force * (4.0 / 3.0 * area - self.reference) - wide),
-                energy_by_curvature: sphere.energy_by_curvature + by_area * radius,
+                energy: sphere.energy + sphere.force * change.displacement - change.energy,
+                energy_by_curvature: sphere.energy_by_curvature + change.by_radius * radius,
                 ..sphere
             },
-            energy_by_modulus: (sphere.energy + by_area) / effective_modulus,
-            energy_by_rate: -wide,
+            energy_by_modulus: (sphere.energy + change.by_radius) / effective_modulus,
+            energy_by_rate: -change.by_rate,
             energy_by_terms: correction.energy_by_terms,
         }
     }
+
+    /// `W` at a force, N, of a sphere of an effective radius, m.
+    fn change(self, force: f64, radius: f64, effective_modulus: f64) -> Change {
+        let Self { rate, reference } = self;
+        let most = if rate < 0.0 { MOST_BENDING / (-rate * REFERENCE * reference.sqrt()) } else { f64::INFINITY };
+        let within = force.min(most);
+        let beyond = force - within;
+        let area = hertz_area(within, radius, effective_modulus);
+        let energy = 0.5 * within * within * (area - reference);
+        let displacement = within * (4.0 / 3.0 * area - reference);
+        let slope = 20.0 / 9.0 * area - reference;
+        Change {
+            displacement: rate * displacement,
+            slope: if beyond > 0.0 { 0.0 } else { rate * slope },
+            energy: rate * (energy + displacement * beyond),
+            by_radius: rate * within * area * (within / 3.0 + 8.0 / 9.0 * beyond),
+            // F_1 goes with 1/kappa.
+            by_rate: energy + (displacement - slope * within) * beyond,
+        }
+    }
+}
+
+/// `W`, J, and its derivatives: the first and second by the force, by the logarithm of the radius, and by `kappa`.
+struct Change {
+    displacement: f64,
+    slope: f64,
+    energy: f64,
+    by_radius: f64,
+    by_rate: f64,
 }
 
 /// Square of the radius of a Hertzian contact, m^2.
@@ -126,7 +159,7 @@ mod tests {
 
     fn widenings() -> impl Iterator<Item = Widening> {
         let unit = 1.0 / (MODULUS * RADIUS.powi(3));
-        [-0.11, 0.0, 0.3, 7.0]
+        [-2.0, -0.6, -0.11, 0.0, 0.3, 7.0]
             .into_iter()
             .map(move |rate| Widening { rate: rate * unit, reference: RADIUS * RADIUS / 4.0 })
     }
@@ -152,7 +185,7 @@ mod tests {
     #[test]
     fn derivatives_by_curvature_modulus_and_rate_are_those_of_the_energy() {
         for widening in widenings() {
-            let depth = 0.3 * RADIUS;
+            let depth = 0.8 * RADIUS;
             let energy = |rate, curvature, modulus| {
                 let pair = SphereOnSurface { curvature, ..PAIR };
                 Widening { rate, ..widening }.indent(depth, pair, modulus, Some(&TERMS)).sphere.energy

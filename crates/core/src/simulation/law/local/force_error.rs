@@ -39,12 +39,12 @@ const BY_LINEAR_ELEMENTS: f64 = 0.04;
 /// Factors of `b` over the breadth: of its cube for a body whose support stiffens the contact, of its sixth power for one that is free
 /// below, and the most that the latter counts. They differ in the part of the depth by which the body yields, which is negative above
 /// a support. Forces on the narrowest columns measured, five elements wide, were 19 % off.
-const BY_BREADTH: [f64; 2] = [0.22, 3.7];
+const BY_BREADTH: [f64; 2] = [0.17, 3.0];
 const MOST_BREADTH: f64 = 0.08;
 const SUPPORTED: f64 = -0.15;
 /// Error of a plate that is held at its rim, the part of it that goes with `1/(1 - 2 nu)`, and the largest of these that counts. A body
 /// becomes a plate between these `b/t`; from `b = t` on, where one or two elements fill its thickness, it grows as `(b/t)^1.5`.
-const BY_BENDING: [f64; 2] = [0.1, 0.0014];
+const BY_BENDING: [f64; 2] = [0.075, 0.001];
 const MOST_INCOMPRESSIBLE: f64 = 50.0;
 const PLATE: [f64; 2] = [0.3, 0.7];
 /// Factor of `b/t`, at most 1, times the depth over the thickness of a body on a support.
