@@ -28,8 +28,8 @@ DIRECT = {
     "from outside": (5.30e-3, 20.33e-3, 42.75e-3),
     "from inside": (17.59e-3, 35.68e-3, 54.87e-3),
 }
-# Largest difference from it: cells over a corner have the compliance of its edges.
-TOLERANCE = {"down": 0.18, "diagonal": 0.45, "from one side": 0.30, "from outside": 0.34, "from inside": 0.36}
+# Largest difference from it.
+TOLERANCE = {"down": 0.11, "diagonal": 0.18, "from one side": 0.40, "from outside": 0.39, "from inside": 0.04}
 
 # Part of its largest force that a tool keeps at the least while it is driven in and slides off to a side.
 LEFT = 0.3
@@ -74,3 +74,6 @@ def test_a_closed_path_over_a_corner_gives_out_no_more_than_was_put_in(loops, pa
             path = polyline([*legs, legs[0]] if not np.array_equal(legs[0], legs[-1]) else legs, STEP)
             given, peak = given_out(path[None], played(simulation, path, Rotation.identity()).forces[None])
             assert given[0] <= 1e-3 * peak[0], f"{name}: {100 * given[0] / peak[0]:+.3f} %"
+            if part < 1.0:
+                # Nor does it lose any: pressure cells would lose 7 % there.
+                assert given[0] >= -1e-3 * peak[0], f"{name}: {100 * given[0] / peak[0]:+.3f} %"

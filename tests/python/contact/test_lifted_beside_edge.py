@@ -1,7 +1,7 @@
-"""A sphere slides away from an edge and is lifted: no force comes back at once, and no energy is given out.
+"""A sphere slides away from an edge near a corner: it has the force of a straight press, and loses no energy.
 
-Beside the edge passivity has shortened the contact. Where it ends the tool is still below the surface, and the next
-contact has to go on from there: it began at its full depth, with 20 % of the largest force in one tick.
+On pressure cells, as near a corner before, it had 36 % less force. Passivity had shortened the contact, and where it
+ended the next one began at its full depth, with 20 % of the largest force in one tick.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ RADIUS, DEPTH, STEP, SIDE = 0.015, 1.5e-3, 2e-5, 0.08
 # Places along the face, m, from its edge.
 BEGIN, END, HEIGHT = 0.003, 0.02, 0.033
 # Largest change in a tick, and what the whole path may give out, over the largest force and the largest work.
-JUMP, GIVEN = 0.05, 3e-3
+JUMP, GIVEN = 0.05, 2e-4
 
 
 def way(corners: list[tuple[float, float]]) -> np.ndarray:
@@ -28,15 +28,19 @@ def way(corners: list[tuple[float, float]]) -> np.ndarray:
     return np.concatenate([at[:1], *(straight(start, end, STEP)[1:] for start, end in itertools.pairwise(at))])
 
 
-def test_a_contact_that_has_been_shortened_does_not_begin_anew_on_lifting():
+def test_a_contact_that_slides_away_from_an_edge_has_the_force_of_a_straight_press():
     mesh = box((10, 10, 7), (SIDE, SIDE, 0.05), quadratic=True)
     body = palpate.Body(mesh, material=palpate.Material(10e3, 0.45), fixed=lambda at: at[:, 2] < 1e-9)
     green = palpate.precompute(body, touch=lambda at: at[:, 0] > 0.04, progress=False)
     high, low = SIDE + RADIUS + 5e-4, SIDE + RADIUS - DEPTH
     path = way([(high, BEGIN), (low, BEGIN), (low, END), (high, END), (high, BEGIN)])
-    forces = loop_of(body, green, [sphere(RADIUS)]).play(path).computed_forces
+    loop = loop_of(body, green, [sphere(RADIUS)])
+    forces = loop.play(path).computed_forces
     largest = np.linalg.norm(forces, axis=1).max()
     assert largest > 0.05
     assert np.linalg.norm(np.diff(forces, axis=0), axis=1).max() < JUMP * largest
     given, most = given_out(path[None], forces[None])
-    assert given[0] < GIVEN * most[0]
+    assert abs(given[0]) < GIVEN * most[0]
+    slid = forces[np.flatnonzero((path[:, 0] == low) & (path[:, 1] == END))[0]]
+    pressed = loop.play(way([(high, END), (low, END)])).computed_forces[-1]
+    assert np.linalg.norm(slid - pressed) < 1e-3 * np.linalg.norm(pressed)

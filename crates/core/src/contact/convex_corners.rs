@@ -1,12 +1,12 @@
-//! Sharp convex corners of a surface, near which a sphere has no closed form.
+//! Sharp convex corners of a surface, deep in which a sphere has no closed form.
 //!
-//! Under a sphere on a corner three quarters of the half-space are missing, and what is left is softer: Sneddon's force is three
-//! to twelve times too large. There its pressure is computed on cells, as that of other tools. With the distance `q` of the
-//! sphere's centre from the nearest corner, over its radius, the share of cells goes from one to zero. It is a function of the
-//! sphere's position over the surface at rest alone, so the mean of both energies with this weight is again one energy.
+//! A sphere that is pressed into a corner by more than a third of its radius lies beside it as much as on it. There its pressure is
+//! computed on cells, as that of other tools. With the distance `q` of the sphere's centre from the nearest corner, over its radius,
+//! the share of cells goes from one to zero. It is a function of the sphere's position over the surface at rest alone, so the mean of
+//! both energies with this weight is again one energy.
 //!
-//! Along edges between corners a sphere has the closed form: cells that pass over an edge give energies whose differences are
-//! forces to 15 % only, so that closed paths over a thin rim would gain energy.
+//! Elsewhere a sphere has the closed form (`convex_edges`, `corner_share`): cells that pass over an edge give energies whose differences
+//! are forces to 15 % only. Closed paths over a thin rim would gain energy with them, and around a corner they lost 7 % of it.
 
 use std::f64::consts::TAU;
 
@@ -21,10 +21,10 @@ use crate::mesh::Surface;
 
 /// Distances of the sphere's centre from a corner, over its radius, up to which its contact is all on cells, and from which it has
 /// none.
-const NEAR: [f64; 2] = [1.2, 2.2];
+const NEAR: [f64; 2] = [0.3, 0.5];
 /// Corners up to this distance from a triangle, over the radius, are listed for it: the sphere's centre may lie as deep below the
 /// triangle as it is far from the corner.
-const LISTED: f64 = 2.0 * NEAR[1];
+const LISTED: f64 = 2.0;
 /// Least number of convex creases that meet in a corner, and least angle that its faces lack of a whole turn, rad: a cube's lack
 /// `pi / 2`. Creases of a rim may meet in a saddle, whose faces have more than a whole turn, and under which nothing is missing.
 const LEAST_CREASES: usize = 3;
@@ -77,7 +77,7 @@ impl CornerSurface {
 }
 
 /// Positions of the nodes in which several creases meet whose faces turn away from each other, m.
-fn convex_corners(surface: &Surface, smooth: &SmoothSurface) -> Vec<DVec3> {
+pub(super) fn convex_corners(surface: &Surface, smooth: &SmoothSurface) -> Vec<DVec3> {
     let mut nodes = vec![(0, TAU); surface.positions.len()];
     for node in smooth.convex_creases(surface).flat_map(|crease| crease.nodes) {
         nodes[node as usize].0 += 1;

@@ -31,7 +31,9 @@ use std::f64::consts::FRAC_PI_2;
 
 use glam::{DMat3, DVec3};
 
+use super::corner_share::ConvexCorner;
 use super::footprint::smooth_step;
+use super::modulus_share::Share;
 use super::smooth::{ConvexCrease, FootPoint, SmoothSurface};
 use super::{SurfaceQuery, TriangleLists};
 use crate::math::{acos, hypot};
@@ -86,17 +88,12 @@ struct Edge {
 /// Sharp convex edges of a surface, for a sphere.
 pub struct ConvexEdges {
     edges: Vec<Edge>,
+    corners: Vec<ConvexCorner>,
+    /// Those near each drawn triangle.
+    near_corners: TriangleLists,
     /// Those near each drawn triangle; pieces of one edge follow each other.
     near: TriangleLists,
     radius: f64,
-}
-
-/// A function of the sphere's centre, its gradient, and its second derivatives.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Share {
-    pub value: f64,
-    pub gradient: DVec3,
-    pub hessian: DMat3,
 }
 
 /// A sphere beside sharp edges.
@@ -121,21 +118,12 @@ struct Across {
     part_slope: DVec3,
 }
 
-impl Share {
-    const WHOLE: Self = Self { value: 1.0, gradient: DVec3::ZERO, hessian: DMat3::ZERO };
-
-    /// The product of two functions.
-    fn times(&self, other: &Self) -> Self {
-        let mixed = outer(self.gradient, other.gradient);
-        Self {
-            value: self.value * other.value,
-            gradient: self.gradient * other.value + other.gradient * self.value,
-            hessian: self.hessian * other.value + other.hessian * self.value + mixed + mixed.transpose(),
-        }
-    }
-}
-
 impl BesideEdges {
+    /// Beside none yet.
+    fn at(foot: &FootPoint) -> Self {
+        Self { share: Share::WHOLE, slowed: *foot, bends: Default::default(), bend_count: 0 }
+    }
+
     /// Adds a direction.
     fn bend(&mut self, direction: DVec3, rate: f64) {
         if let Some(place) = self.bends.get_mut(self.bend_count) {
@@ -260,7 +248,14 @@ impl ConvexEdges {
             .iter()
             .map(|&Edge { ends: [first, second], .. }| [first.min(second) - reach, first.max(second) + reach]);
         let near = TriangleLists::new(surface, query, boxes);
-        Some(Self { edges, near, radius })
+        let ending = |at: DVec3| {
+            let ends = move |edge: &&Edge| (0..2).any(|k| edge.is_last[k] && edge.ends[k] == at);
+            edges.iter().filter(ends).map(|edge| edge.normals)
+        };
+        let corners = ConvexCorner::all(surface, smooth, ending);
+        let around = corners.iter().map(|corner| corner.box_around(radius));
+        let near_corners = TriangleLists::new(surface, query, around);
+        Some(Self { edges, corners, near_corners, near, radius })
     }
 
     /// Where a sphere with its centre and foot there is beside sharp edges; `None` elsewhere.
@@ -281,14 +276,15 @@ impl ConvexEdges {
             if beyond || across.part == 0.0 {
                 continue;
             }
-            let beside = found.get_or_insert(BesideEdges {
-                share: Share::WHOLE,
-                slowed: *foot,
-                bends: Default::default(),
-                bend_count: 0,
-            });
+            let beside = found.get_or_insert_with(|| BesideEdges::at(foot));
             beside.share = beside.share.times(&edge.share(&across, self.radius));
             edge.slow(&across, SLOWED * self.radius, beside);
+        }
+        for &corner in self.near_corners.at(foot.triangle) {
+            if let Some(share) = self.corners[corner as usize].share(centre, self.radius) {
+                let beside = found.get_or_insert_with(|| BesideEdges::at(foot));
+                beside.share = beside.share.times(&share);
+            }
         }
         found
     }
@@ -307,7 +303,9 @@ impl ConvexEdges {
     /// Adds the memory that a tick reads.
     pub(crate) fn add_memory(&self, ranges: &mut Ranges) {
         ranges.add(&self.edges);
+        ranges.add(&self.corners);
         self.near.add_memory(ranges);
+        self.near_corners.add_memory(ranges);
     }
 }
 
