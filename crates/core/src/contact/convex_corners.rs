@@ -138,7 +138,7 @@ mod tests {
         let corners = of(&surface, radius).expect("corners");
         let query = SurfaceQuery::new(&surface).expect("triangles");
         let share = |x: f64| {
-            let position = DVec3::new(x, 1.0, 1.0 + 0.9 * radius);
+            let position = DVec3::new(x, 1.0, 1.0 + 0.2 * radius);
             let triangle = query.closest(&surface, position).expect("a point").triangle;
             corners.share(triangle, position)
         };
