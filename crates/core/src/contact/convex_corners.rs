@@ -1,6 +1,6 @@
 //! Sharp convex corners of a surface, deep in which a sphere has no closed form.
 //!
-//! A sphere that is pressed into a corner by more than a third of its radius lies beside it as much as on it. There its pressure is
+//! A sphere that is pressed into a corner by more than half of its radius lies beside it as much as on it. There its pressure is
 //! computed on cells, as that of other tools. With the distance `q` of the sphere's centre from the nearest corner, over its radius,
 //! the share of cells goes from one to zero. It is a function of the sphere's position over the surface at rest alone, so the mean of
 //! both energies with this weight is again one energy.

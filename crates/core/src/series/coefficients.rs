@@ -73,20 +73,14 @@ struct Hardening {
 }
 
 impl Hardening {
-    /// Of the displacement `q/c_1 = F + e_2 F^2 + .. + e_6 F^6`, of which the part `bends` is not the half-space's.
+    /// Of a body with the displacement `q = c_1 (F + e_2 F^2 + .. + e_6 F^6)`. `bends` is the part of `c_1` that the half-space lacks.
     fn new(orders: [f64; 5], bends: f64) -> Self {
-        let (first, matched) = (Self::of_three(orders), Self::of_five(orders));
+        let first = Self::of_three(orders);
         let [second, third, ..] = orders;
         let part = rise(bends, BENDS) * if third < 0.0 { rise(-third / (second * second), HARD) } else { 0.0 };
-        match matched {
-            Some(matched) if part > 0.0 => {
-                let mixed = |a: f64, b: f64| a + part * (b - a);
-                let [bending, hardening] =
-                    [mixed(first.bending, matched.bending), mixed(first.hardening, matched.hardening)];
-                Self { bending, hardening, ending: mixed(first.ending, matched.ending) }
-            }
-            _ => first,
-        }
+        let Some(matched) = Self::of_five(orders).filter(|_| part > 0.0) else { return first };
+        let mixed = |of: fn(&Self) -> f64| of(&first) + part * (of(&matched) - of(&first));
+        Self { bending: mixed(|x| x.bending), hardening: mixed(|x| x.hardening), ending: mixed(|x| x.ending) }
     }
 
     /// `alpha = -share e_2`, and the cubic terms cancel for `kappa = -(e_3 + 2 alpha e_2)`. Both are zero for a body that softens,

@@ -108,7 +108,7 @@ impl SeriesPlan {
         fields.collect()
     }
 
-    /// Displacements of the second and third order of a half-space of the material at a place, m/N^2 and m/N^3.
+    /// `1/(E* b)` of the material at a place, m/N, and a half-space's displacements of the second and third order, m/N^2 and m/N^3.
     fn half_space(&self, place: &Place) -> [f64; 3] {
         let node = self.problem.surface_nodes[self.smooth.fans()[place.fan].node as usize] as usize;
         let around = &self.elements.1[self.elements.0[node]..self.elements.0[node + 1]];
