@@ -96,7 +96,7 @@ test: | check-tools
 	cd viewer && npm run --silent check
 	$(PYTEST) -m "not slow" $(ARGS)
 
-# Slow tests and campaigns of random touches, presses, writers and answers. CI runs a sixth of their files after `make
+# Slow tests and campaigns of random touches, presses, writers and answers. CI runs a tenth of their files after `make
 # test`, with a share of the cases; `make campaigns ARGS=--whole` takes all, about an hour.
 campaigns: $(VENV)/.installed $(PAGE) $(WEB)
 	$(PYTEST) -m slow $(ARGS)
