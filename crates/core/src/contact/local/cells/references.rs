@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::{DMat3, DVec3};
 
-use super::{GridFrame, Heights, Relief};
+use super::{GridFrame, Heights, Relief, Wedge};
 
 /// A surface of second order around the origin, in axes of its own: its height is `-(k_xx x^2 + 2 k_xy x y + k_yy y^2)/2`.
 #[derive(Clone, Copy)]
@@ -39,6 +39,22 @@ impl Relief for Quadric {
                 heights.raise((i, j), height, slopes, DVec3::new(u, v, height));
             }
         }
+    }
+}
+
+/// A level surface that ends in a right-angled edge along the second axis, and is softer up to a distance `reach` from it, m.
+pub struct Step {
+    /// Place of the edge along the first axis, m.
+    pub edge: f64,
+    pub reach: f64,
+}
+
+impl Relief for Step {
+    fn fill(&self, frame: &GridFrame, heights: &mut Heights) {
+        Quadric { curvature: [0.0; 3], axes: DMat3::IDENTITY }.fill(frame, heights);
+        let [from, to] = [-1.0, 1.0].map(|y| DVec3::new(self.edge, y, 0.0));
+        let wedge = Wedge::new(DVec3::Z, DVec3::X, to - from).expect("a convex edge");
+        heights.soften(frame, [from, to], &wedge, self.reach);
     }
 }
 

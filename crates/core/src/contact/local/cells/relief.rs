@@ -189,7 +189,8 @@ impl Heights {
     pub fn clear(&mut self) {
         self.height = [[f64::NEG_INFINITY; MAX_CELLS]; MAX_CELLS];
         if self.has_edge {
-            self.softening = [[0.0; MAX_CELLS]; MAX_CELLS];
+            let zero = [[0.0; MAX_CELLS]; MAX_CELLS];
+            (self.softening, self.softening_slopes, self.softening_turns) = (zero, [zero; 2], [zero; 2]);
             self.has_edge = false;
         }
     }

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::{DQuat, EulerRot};
 
-use super::references::{Quadric, hertz_ellipse};
+use super::references::{Quadric, Step, hertz_ellipse};
 use super::*;
 use crate::contact::local::{ContactPlane, SphereOnSurface, ToolPose, indent_sphere};
 use crate::contact::shape::{SurfaceShape, tests::sphere_mesh};
@@ -302,6 +302,40 @@ fn every_solution_ends_and_does_not_depend_on_its_start() {
                 assert_eq!(problem.solve(&bent(curvature), &mut before, &mut CellScratch::default()), warm);
             }
         }
+    }
+}
+
+/// Cells that are no longer beside an edge keep nothing of its softer compliance, nor of the slopes of that.
+#[test]
+fn nothing_of_an_edge_is_left_in_the_memory() {
+    let shape = ToolShape::ellipsoid(DVec3::new(0.012, 0.006, 0.005)).unwrap();
+    let problem = CellProblem { width: 0.02, ..pressed(&shape, DVec3::ZERO, 1e-3) };
+    let (mut state, mut scratch) = (PressureState::default(), CellScratch::default());
+    let beside = problem.solve(&Step { edge: 1e-3, reach: 0.004 }, &mut state, &mut scratch);
+    assert!(beside.force.x.abs() > 0.01 * beside.force.z, "{}", beside.force);
+    let [after, far] = [5e-3, 1.0].map(|edge| {
+        let step = Step { edge, reach: 0.004 };
+        let after = problem.solve(&step, &mut PressureState::default(), &mut scratch);
+        assert_eq!(after, problem.solve(&step, &mut PressureState::default(), &mut CellScratch::default()));
+        after
+    });
+    assert!(after.energy < far.energy);
+    assert!(far.force.truncate().length() < 1e-9 * far.force.z, "{}", far.force);
+}
+
+/// Beside an edge the wrench has the slope of the softer compliance: the energy falls towards it.
+#[test]
+fn the_force_beside_an_edge_is_the_gradient_of_the_energy() {
+    let (shape, h) = (ToolShape::ellipsoid(DVec3::new(0.008, 0.006, 0.005)).unwrap(), 1e-6);
+    let at = |edge: f64| {
+        let problem = CellProblem { width: 0.02, ..pressed(&shape, DVec3::ZERO, 1e-3) };
+        problem.solve(&Step { edge, reach: 0.004 }, &mut PressureState::default(), &mut CellScratch::default())
+    };
+    for edge in [1e-3, 2.5e-3, 4e-3] {
+        // The tool moves away from the edge as the edge from the tool.
+        let slope = (at(edge + h).energy - at(edge - h).energy) / (2.0 * h);
+        let aside = at(edge).body_force.x;
+        assert!(near(aside.abs(), slope.abs(), 0.02), "{edge} {aside} {slope}");
     }
 }
 
