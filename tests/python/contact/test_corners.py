@@ -75,5 +75,5 @@ def test_a_closed_path_over_a_corner_gives_out_no_more_than_was_put_in(loops, pa
             given, peak = given_out(path[None], played(simulation, path, Rotation.identity()).forces[None])
             assert given[0] <= 1e-3 * peak[0], f"{name}: {100 * given[0] / peak[0]:+.3f} %"
             if part < 1.0:
-                # Nor does it lose any: pressure cells would lose 7 % there.
+                # Nor does it lose any: pressure cells would lose 2 % there.
                 assert given[0] >= -1e-3 * peak[0], f"{name}: {100 * given[0] / peak[0]:+.3f} %"
