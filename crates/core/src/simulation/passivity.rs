@@ -1,7 +1,7 @@
 //! Passivity of contacts under the local law on a body at rest: they release no more energy than tools have put in.
 //!
 //! The stored energy changes by the work of the tools less the dissipation by friction, as long as forces are the gradient of one
-//! energy. Where a contact moves to another side of an edge, or cells pass one, the stored energy may rise by a surplus:
+//! energy. Where a contact moves to another side of an edge, the stored energy may rise by a surplus:
 //!
 //! ```text
 //! surplus += E_new - E_old - W + dissipated         W = sum (f_old + f_new)/2 . dp - (T_old + T_new)/2 . dtheta
