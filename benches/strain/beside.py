@@ -29,8 +29,9 @@ from palpate.validation.verify.contact.loop import UNLIMITED, sphere
 
 # Distance between ticks of a press, m, and the height from which it starts.
 TICK, START = 2e-5, 5e-4
-# Radius around the place that may be touched, and how far below it, over the sphere's radius.
-TOUCHED, DEEP = 3.6, 2.5
+# Radius around the place that may be touched, and how far below it, over the sphere's radius: with less, the patches
+# of the liver's large elements would be cut off at the end of it.
+TOUCHED, DEEP = 6.0, 4.0
 
 
 @dataclass(frozen=True)
