@@ -23,10 +23,10 @@ BEGIN, END, HEIGHT = 0.003, 0.02, 0.033
 JUMP, GIVEN = 0.05, 2e-4
 
 
-def way(corners: list[tuple[float, float]]) -> np.ndarray:
-    """Path through places (x, y), m."""
-    at = np.array([(x, y, HEIGHT) for x, y in corners])
-    return np.concatenate([at[:1], *(straight(start, end, STEP)[1:] for start, end in itertools.pairwise(at))])
+def way(corners: list[tuple[float, float, float]], step: float = STEP) -> np.ndarray:
+    """Path through places, m."""
+    at = np.array(corners)
+    return np.concatenate([at[:1], *(straight(start, end, step)[1:] for start, end in itertools.pairwise(at))])
 
 
 def test_a_contact_that_slides_away_from_an_edge_has_the_force_of_a_straight_press():
@@ -34,7 +34,8 @@ def test_a_contact_that_slides_away_from_an_edge_has_the_force_of_a_straight_pre
     body = palpate.Body(mesh, material=palpate.Material(10e3, 0.45), fixed=lambda at: at[:, 2] < 1e-9)
     green = palpate.precompute(body, touch=lambda at: at[:, 0] > 0.04, progress=False)
     high, low = SIDE + RADIUS + 5e-4, SIDE + RADIUS - DEPTH
-    path = way([(high, BEGIN), (low, BEGIN), (low, END), (high, END), (high, BEGIN)])
+    corners = [(high, BEGIN), (low, BEGIN), (low, END), (high, END), (high, BEGIN)]
+    path = way([(x, y, HEIGHT) for x, y in corners])
     loop = loop_of(body, green, [sphere(RADIUS)])
     forces = loop.play(path).computed_forces
     largest = np.linalg.norm(forces, axis=1).max()
@@ -43,7 +44,7 @@ def test_a_contact_that_slides_away_from_an_edge_has_the_force_of_a_straight_pre
     given, most = given_out(path[None], forces[None])
     assert abs(given[0]) < GIVEN * most[0]
     slid = forces[np.flatnonzero((path[:, 0] == low) & (path[:, 1] == END))[0]]
-    pressed = loop.play(way([(high, END), (low, END)])).computed_forces[-1]
+    pressed = loop.play(way([(high, END, HEIGHT), (low, END, HEIGHT)])).computed_forces[-1]
     assert np.linalg.norm(slid - pressed) < 1e-3 * np.linalg.norm(pressed)
 
 
@@ -55,9 +56,8 @@ def test_an_ellipsoid_that_comes_back_from_an_edge_has_its_force_again():
     tool = {"shape": "ellipsoid", "semi_axes": (0.004, 0.003, 0.003), "contact": "local", "friction": 0.0}
     clear, deep = -0.0035, -0.0025
     corners = [(clear, 0.043), (deep, 0.043), (deep, 0.0492), (deep, 0.043), (clear, 0.043)]
-    at = np.array([(x, 0.04, z) for x, z in corners])
-    path = np.concatenate([at[:1], *(straight(start, end, 1e-5)[1:] for start, end in itertools.pairwise(at))])
-    # Its first axis along the edge's face, its third one into it.
+    path = way([(x, 0.04, z) for x, z in corners], 1e-5)
+    # Its first axis across the edge, its third one out of the face.
     turned = np.tile([np.sqrt(0.5), 0.0, -np.sqrt(0.5), 0.0], (len(path), 1))
     forces = loop_of(body, green, [tool]).play(path, turned).computed_forces
     places = np.flatnonzero(path[:, 0] == deep)
