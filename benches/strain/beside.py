@@ -148,9 +148,10 @@ def strain(
     Example: python -m benches strain --only block,column
     """
     if ticks:
-        first, second = sliding_ticks()
-        for name, times in (("A", first), ("B", second)):
-            print(f"{name}, sliding, us: median {times.median:.1f}, 99.9 % {times.p999:.1f}, worst {times.worst:.0f}")
+        for row in sliding_ticks():
+            of_all = f"median {row.median:.1f}, 99.9 % {row.p999:.1f}, worst {row.worst:.0f}"
+            shortest = f"shortest of each tick's plays: median {row.shortest:.1f}, costliest {row.costliest:.1f}"
+            print(f"{row.labels['law']}, sliding, us: {of_all}; {shortest}")
         return
     if elements:
         lacking = list(lacking_rows())

@@ -10,10 +10,11 @@ import numpy as np
 import palpate
 from benches.strain.bodies import cuboids
 from benches.strain.cylinders import RADIUS
+from benches.tick_case import Row
 from palpate.scene import BuiltScene, Scene
 from palpate.scene.series import with_series
 from palpate.simulation import Simulation
-from palpate.validation.ticks import Times, tick_times
+from palpate.validation.ticks import tick_times
 from palpate.validation.verify.contact.loop import UNLIMITED, sphere
 
 # Plays of each, depth, m, speed of sliding, m a tick.
@@ -21,7 +22,7 @@ PLAYS, DEPTH, STEP = 12, 0.006, 2e-5
 TICKS = 1000
 
 
-def sliding_ticks() -> tuple[Times, Times]:
+def sliding_ticks() -> tuple[Row, Row]:
     """Time ticks of A and of B on the cantilever, us."""
     case = next(iter(cuboids()))
     body = case.body("neo-hookean")
@@ -39,5 +40,6 @@ def sliding_ticks() -> tuple[Times, Times]:
         for _ in range(PLAYS):
             for simulation, of in zip(simulations, times, strict=True):
                 of.append(tick_times(simulation, path[:, None, :].copy(), 1)[0, len(down) + 1 :])
-    first, second = (Times.of(np.array(of)) for of in times)
+    of_law = dict(zip(("A", "B"), times, strict=True))
+    first, second = (Row.of("sliding", {"law": law}, np.array(of), 1, {}) for law, of in of_law.items())
     return first, second

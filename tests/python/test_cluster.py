@@ -69,6 +69,7 @@ def test_one_worker_killed_half_way_leaves_the_bits_of_one_machine(workers, body
     assert seen == sorted(seen) and seen[0] == 0 and seen[-1] == 3 * len(body.mesh.surface_nodes)
 
 
+@pytest.mark.slow
 def test_a_series_by_two_workers_has_the_bits_of_one_machine(workers, tmp_path):
     mesh = box_mesh(cells=(8, 8, 4))
     material = palpate.Material(1e4, 0.45, law="neo-hookean")

@@ -30,6 +30,7 @@ FILES = {"palpate.wasm", "palpate.h", "palpate.pc"}
 LONG = re.compile(r"--[a-z-]+")
 
 
+@pytest.mark.slow
 def test_every_option_of_every_command_is_on_its_page():
     """As `--help` prints them, which typer writes by another way."""
     page = command_pages.page()

@@ -15,6 +15,7 @@ NAMES = {"tick", "contact", "scale", "precompute", "surface", "elements", "paper
 NAMES |= {"zwidth", "touches", "web"}
 
 
+@pytest.mark.slow
 def test_every_benchmark_is_listed():
     listed = run_bench("--help").stdout
     assert set(listed[listed.index("Commands:") :].split()) >= NAMES

@@ -26,6 +26,7 @@ def measured(tmp_path_factory):
     return path, scale.run(SETTINGS, path, reports.append), reports
 
 
+@pytest.mark.slow
 def test_a_row_tells_of_every_stage(measured):
     _, results, reports = measured
     row = results.rows[600]
@@ -68,6 +69,7 @@ def test_powers_are_those_of_the_rows():
     )
 
 
+@pytest.mark.slow
 def test_a_size_that_cannot_be_measured_says_why():
     with pytest.raises(palpate.Error, match=r"600 tetrahedra cannot be measured: .*memory") as refusal:
         scale.run(scale.Settings(sizes=(600,), memory=10_000_000))

@@ -60,6 +60,7 @@ def test_a_hand_adds_its_damping(spring, hand):
     assert spring.largest_stable(Device("emulated", alone), hand) == pytest.approx(expected, rel=0.01)
 
 
+@pytest.mark.slow
 def test_touches_of_an_example_come_to_rest(devices, shared_cache):
     built = palpate.Scene.read(BLOCK).build(progress=False)
     chosen = [devices["Touch"], frictionless(devices["Touch"]), frictionless(devices["omega"])]

@@ -109,6 +109,7 @@ def test_places_that_are_played_at_once_are_told_apart(monkeypatch, plates):
     assert times.tolist() == [[0.0, 1.0, 6.0, 7.0], [2.0, 3.0, 8.0, 9.0], [4.0, 5.0, 10.0, 11.0]]
 
 
+@pytest.mark.slow
 def test_motions_under_the_local_law_are_in_contact(monkeypatch, plates):
     """One is free, one taps, and large tools begin or end beside what is touchable."""
     monkeypatch.setattr(tick, "_plate", lambda _cells: plates[SMALL])

@@ -40,7 +40,7 @@ def test_example(example, tmp_path, shared_cache):
 CHUNKS = [text.split("```")[0] for text in (ROOT / "docs" / "dynamics.md").read_text().split("```python\n")[1:]]
 
 
-@pytest.mark.quick(2)
+@pytest.mark.slow
 @pytest.mark.parametrize("code", CHUNKS, ids=["scene", "newmark"])
 def test_the_examples_of_the_page_on_motion(code):
     result = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=280)
@@ -56,6 +56,7 @@ def two_bodies(cache):
         return palpate.Scene.read(ROOT / "examples" / "two_bodies.toml").build(progress=False)
 
 
+@pytest.mark.slow
 def test_two_fingers_on_two_bodies(two_bodies):
     """The second presses the second body, then the first body beside the first finger, which feels it."""
     simulation = palpate.Simulation(two_bodies)

@@ -66,6 +66,7 @@ def test_a_press_is_recorded_and_made_again(recorded, shared_cache, tmp_path):
     assert force.max() > 0.01
 
 
+@pytest.mark.slow
 def test_another_scene_gives_other_bits(recorded, block, shared_cache, tmp_path):
     text = block.read_text()
     (tmp_path / "slippery.toml").write_text(text.replace('radius = "6mm"', 'radius = "6.0001mm"'))

@@ -256,6 +256,7 @@ def test_the_shell_completes_models_checks_and_units(words, offered):
     assert set(offered) <= set(result.output.split())
 
 
+@pytest.mark.slow
 def test_a_slender_rod_held_at_one_end_is_noted(tmp_path):
     box_mesh((12, 2, 2), (0.4, 0.02, 0.02)).to_quadratic().write(tmp_path / "rod.vtu")
     held = run(

@@ -75,7 +75,7 @@ def largest_forces(recording: Path) -> np.ndarray:
     return recording.forces.reshape(len(recording.time), -1, 3)[:, :, 2].max(axis=0)
 
 
-@pytest.mark.quick(2)
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", LIBRARIES)
 def test_a_library_moves_the_first_tool(pressed, kind):
     words, recording = pressed(kind)

@@ -69,6 +69,7 @@ def test_a_client_of_the_command_feels_the_block(tmp_path, shared_cache):
             client.stop()
 
 
+@pytest.mark.slow
 def test_without_the_option_no_port_is_open(tmp_path, shared_cache):
     port, page = free_port(), free_port()
     (tmp_path / "beam.toml").write_text('[body]\nmodel = "beam"\npaper = true\n')

@@ -49,7 +49,7 @@ def test_a_sphere_on_a_corner_feels_what_the_direct_solution_does(loops, name):
     assert np.abs(off).max() <= TOLERANCE[name], np.round(100 * off, 1)
 
 
-@pytest.mark.quick(3)
+@pytest.mark.quick(5)
 @pytest.mark.parametrize("tool", ["sphere", "ellipsoid", "capsule"])
 @pytest.mark.parametrize("name", WAYS)
 def test_a_tool_that_is_driven_into_a_corner_keeps_its_contact(loops, name, tool):

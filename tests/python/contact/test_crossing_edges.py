@@ -207,7 +207,7 @@ QUICK = [
 ]
 
 
-@pytest.mark.quick(4)
+@pytest.mark.quick(8)
 @pytest.mark.parametrize("crossing", QUICK, ids=str)
 def test_a_tool_crosses_an_edge_without_a_jump_and_keeps_its_contact(loops, crossing):
     wrong = judged(loops, crossing)
@@ -231,7 +231,7 @@ def test_in_a_corner_a_tool_presses_both_walls(loops, tool):
     assert abs(both[0, 0] / alone - 1) > 0.15 and abs(above[-1, 2] / both[0, 2] - 1) > 0.15
 
 
-@pytest.mark.quick(2)
+@pytest.mark.quick(4)
 @pytest.mark.parametrize("degrees", [60, 120, *(pytest.param(other, marks=pytest.mark.slow) for other in (90, 150))])
 def test_in_the_middle_of_a_valley_its_sides_press_alike(loops, degrees):
     """A capsule lies across it with both ends: by symmetry they push along the valley's bisector."""
@@ -292,6 +292,7 @@ def spring_of_blade(stiffness: np.ndarray, centres: np.ndarray, radius: float) -
     return forces
 
 
+@pytest.mark.slow
 def test_a_thin_blade_springs_back_under_a_capsule_along_it(loops):
     """As its tip alone would, with the body's stiffness and without any law of contact: this jump is the body's own."""
     for (kind, degrees, tool, pose), most in SPRINGS.items():

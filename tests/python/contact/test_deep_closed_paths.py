@@ -146,6 +146,7 @@ def test_a_cups_wall_gives_back_what_was_put_in(loops, tool, part):
     assert all(abs(given) <= TOLERANCE for given in found.values()), ratios(found)
 
 
+@pytest.mark.quick(4)
 @pytest.mark.parametrize("part", [0.5, 1.0, 2.0, 4.0])
 def test_a_rim_gives_out_no_more_than_was_put_in(loops, part):
     for tool in ("sphere", "small sphere"):

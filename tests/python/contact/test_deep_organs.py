@@ -85,7 +85,7 @@ def lost(forces: np.ndarray) -> float:
     return float((np.maximum.accumulate(forces) - forces).max() / forces.max())
 
 
-@pytest.mark.quick(3)
+@pytest.mark.quick(6)
 @pytest.mark.filterwarnings("ignore::palpate.TouchWarning")
 @pytest.mark.parametrize("law", ["linear", "neo-hookean"])
 @pytest.mark.parametrize("node", NODES)
@@ -96,6 +96,7 @@ def test_the_force_of_a_deep_press_grows_to_the_end(node, law):
     assert lost(forces) <= allowed, f"{100 * lost(forces):.1f} % of {forces.max():.2f} N"
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::palpate.TouchWarning")
 def test_a_press_between_two_walls_beside_a_direct_solution():
     """Where the walls' closest points come together the contacts stay on their planes."""
@@ -108,6 +109,7 @@ def test_a_press_between_two_walls_beside_a_direct_solution():
     assert np.all(np.abs(error) < HOLLOW_TOLERANCE), (expected, error)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::palpate.TouchWarning")
 @pytest.mark.parametrize("law", ["linear", "neo-hookean"])
 def test_no_force_rises_at_once_in_a_rough_hollow(law):

@@ -25,7 +25,9 @@ UP = np.array([0.0, 0.0, 1.0])
 OUT = np.array([1.0, 0.0, 1.0]) / np.sqrt(2)
 # Radius of the round edge, m, and 0 for the sharp one; largest difference from the direct solution.
 ROUND = 6e-3
-TOLERANCES = {ROUND: 0.065, 0.0: 0.10}
+TOLERANCES = {ROUND: 0.05, 0.0: 0.10}
+# Largest of the capsule along the round edge, 0.5 mm deep; the limit of finer meshes is 0.3 % closer.
+ALONG_ROUND = 0.058
 CAPSULE = {"shape": "capsule", "radius": 3e-3, "length": 18e-3}
 PUNCH = {"shape": "punch", "radius": 6e-3, "rounding": 1.8e-3}
 CAPSULE_SHAPE, PUNCH_SHAPE = edge_block.capsule(3e-3, 18e-3), edge_block.punch(6e-3, 1.8e-3)
@@ -64,11 +66,11 @@ POSES = {
 # Along the way, N, as `solved_directly` finds them on its finest meshes.
 DIRECT = {
     ROUND: {
-        "a capsule along the edge": (46.31e-3, 102.8e-3, 163.2e-3),
-        "a capsule across the edge": (12.07e-3, 33.11e-3, 59.00e-3),
-        "a punch on the edge": (32.78e-3, 75.49e-3, 122.6e-3),
-        "a capsule that lies on the top and overhangs": (23.55e-3, 54.97e-3, 90.44e-3),
-        "a punch that stands on the top and overhangs": (26.02e-3, 58.90e-3, 95.17e-3),
+        "a capsule along the edge": (46.07e-3, 102.4e-3, 162.8e-3),
+        "a capsule across the edge": (12.03e-3, 33.05e-3, 59.03e-3),
+        "a punch on the edge": (32.71e-3, 75.35e-3, 122.5e-3),
+        "a capsule that lies on the top and overhangs": (23.53e-3, 54.95e-3, 90.21e-3),
+        "a punch that stands on the top and overhangs": (25.93e-3, 58.77e-3, 95.12e-3),
     },
     0.0: {
         "a capsule along the edge": (27.48e-3, 61.00e-3, 97.56e-3),
@@ -114,13 +116,15 @@ def within(forces: np.ndarray, direct: np.ndarray, tolerance: float) -> np.ndarr
     return np.abs(forces / direct - 1) <= tolerance
 
 
-@pytest.mark.quick(3)
+@pytest.mark.quick(5)
 @pytest.mark.parametrize("name", POSES)
 def test_a_tool_on_an_edge_feels_what_the_direct_solution_does(block, name):
     rounding, direct = block[0], np.array(DIRECT[block[0]][name])
     forces = pressed(block, POSES[name])
     off = ", ".join(f"{100 * part:+.1f} %" for part in forces / direct - 1)
-    assert within(forces, direct, TOLERANCES[rounding]).all(), f"{name}, rounding {rounding} m: {off}"
+    along_round = rounding == ROUND and name == "a capsule along the edge"
+    tolerance = ALONG_ROUND if along_round else TOLERANCES[rounding]
+    assert within(forces, direct, tolerance).all(), f"{name}, rounding {rounding} m: {off}"
 
 
 @pytest.mark.parametrize(("rounding", "tolerance"), TOLERANCES.items())
@@ -141,7 +145,7 @@ def test_wrong_forces_are_not_within_the_tolerance(rounding, tolerance):
 @pytest.mark.parametrize(("rounding", "element", "same"), [(ROUND, 1.2e-3, 0.02), (0.0, 1e-3, 0.05)])
 @pytest.mark.parametrize("name", POSES)
 def test_the_direct_solution_hardly_changes_with_its_mesh(name, rounding, element, same):
-    """The table's are those of meshes with elements of 0.7 of these."""
+    """The table's are those of meshes with elements of 0.7 of these, and of half of these for the round edge."""
     found = solved_directly(POSES[name], rounding, element)
     assert np.abs(found / DIRECT[rounding][name] - 1).max() <= same, found
 

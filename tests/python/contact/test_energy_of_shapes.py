@@ -37,7 +37,7 @@ def bench(request) -> EnergyBench:
     return EnergyBench(body_on_table(energy.Block(), (6, 6, 3), quadratic=True), TOOLS[request.param])
 
 
-@pytest.mark.quick(3)
+@pytest.mark.quick(5)
 @pytest.mark.parametrize("condition", CONDITIONS, ids=str)
 def test_closed_paths_give_out_no_energy(bench, condition):
     given, peak = bench.measured(condition, PATHS)

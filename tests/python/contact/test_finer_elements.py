@@ -33,6 +33,7 @@ def forces(mesh: palpate.TetMesh, place: np.ndarray, normal: np.ndarray) -> np.n
     return np.interp(DEPTHS, down, pressed)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::palpate.TouchWarning")
 def test_the_force_beside_a_rim_does_not_depend_on_the_elements():
     mesh = palpate.models.liver()

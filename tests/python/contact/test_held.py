@@ -23,6 +23,7 @@ def block():
     return body, green_of(body, touch=top_nodes(body))
 
 
+@pytest.mark.quick(3)
 @pytest.mark.parametrize("name", TOOLS)
 @pytest.mark.parametrize("come", [(1e-4, 0.0, -1e-4), (3e-5, 2e-5, -1e-5), (0.0, 0.0, -7e-6)])
 def test_a_held_force_neither_creeps_nor_jumps(block, name, come):

@@ -69,6 +69,7 @@ def test_where_nothing_can_be_written_the_answer_is_the_same(kept):
     assert file.is_dir()
 
 
+@pytest.mark.slow
 def test_few_are_kept_beside_a_store(kept):
     folder, press = kept
     for k in range(20):

@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
+import pytest
 
 import palpate
 from palpate.validation.verify.contact.loop import loop_of, sphere, straight
@@ -29,6 +30,7 @@ def way(corners: list[tuple[float, float, float]], step: float = STEP) -> np.nda
     return np.concatenate([at[:1], *(straight(start, end, step)[1:] for start, end in itertools.pairwise(at))])
 
 
+@pytest.mark.slow
 def test_a_contact_that_slides_away_from_an_edge_has_the_force_of_a_straight_press():
     mesh = box((10, 10, 7), (SIDE, SIDE, 0.05), quadratic=True)
     body = palpate.Body(mesh, material=palpate.Material(10e3, 0.45), fixed=lambda at: at[:, 2] < 1e-9)

@@ -28,6 +28,7 @@ def pressed(loops: Loops, beside: float, deep: float) -> np.ndarray:
     return forces_at(loops, polyline([low + (deep + 1e-3) * UP, low], STEP))[-1]
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize("part", [0.25, 0.5])
 def test_a_sphere_that_is_carried_over_an_edge_has_the_force_of_a_press(loops, part):
     deep = part * RADIUS

@@ -99,6 +99,7 @@ def plate(request, tmp_path_factory) -> tuple[float, palpate.Body, palpate.Green
     return request.param, body, palpate.precompute(body, precision="f32", path=path)
 
 
+@pytest.mark.quick(3)
 @pytest.mark.parametrize("angle", [0, 30, 45])
 @pytest.mark.parametrize(
     ("tool", "height"), [({"radius": 0.005}, 5e-3), ({"radius": 1.5e-3}, 1.5e-3), (ELLIPSOID, 5e-3)]

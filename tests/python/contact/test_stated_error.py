@@ -37,6 +37,7 @@ def test_forces_are_those_of_a_full_solution_within_the_stated_error(name, tmp_p
         assert np.abs(factor * forces / body.forces - 1.0).max() > ALLOWED
 
 
+@pytest.mark.quick(3)
 @pytest.mark.parametrize("nu", [0.3, 0.45, 0.49])
 def test_a_column_has_the_force_of_a_full_solution(nu, tmp_path):
     """A patch of three radii, which its sides cut off, would be 4 to 14 % off."""
@@ -48,6 +49,7 @@ def test_a_column_has_the_force_of_a_full_solution(nu, tmp_path):
     assert stated.max() < 0.065
 
 
+@pytest.mark.slow
 def test_a_plate_that_hardens_is_followed_to_one_and_a_half_thicknesses(tmp_path):
     """A series in powers of the force turns back at one thickness."""
     (plate,) = (body for body in references(0.006) if body.name == "plate")
@@ -70,6 +72,7 @@ def test_a_plate_that_is_held_at_two_sides_is_followed_to_one_and_a_half_thickne
     assert (errors < stated).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["dome 0.45", "hollow 0.45", "dome 0.3", "hollow 0.3"])
 def test_a_curved_surface_has_the_force_of_a_full_solution(name, tmp_path):
     """A sphere of the effective radius would be 7 to 11 % off one radius deep."""
@@ -81,6 +84,7 @@ def test_a_curved_surface_has_the_force_of_a_full_solution(name, tmp_path):
     assert (errors < stated).all()
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize("thickness", ["0.01", "0.015"])
 def test_a_glued_layer_has_the_force_of_a_full_solution(thickness, tmp_path):
     """With the compliance of a patch as wide as the layer is thick it would be 9 to 12 % off on the thinner one."""

@@ -86,6 +86,7 @@ def test_the_strain_of_a_pose_is_that_of_the_numeric(measured):
     assert measured.measure.largest(displacements.ravel()) == pytest.approx(expected, rel=1e-9)
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize("contacts", [1, 2])
 def test_the_share_is_that_of_all_places(measured, contacts):
     random = np.random.default_rng(7)

@@ -24,6 +24,7 @@ WORK = {
 }
 
 
+@pytest.mark.quick(2)
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of addresses are Linux's")
 @pytest.mark.parametrize("what", WORK)
 def test_scratch_that_the_system_does_not_give_is_a_line(what, tmp_path):

@@ -59,6 +59,7 @@ def test_the_closed_form_of_a_torus():
     assert mesh.volume == pytest.approx(2 * np.pi**2 * 0.04 * 0.01**2, rel=0.012)
 
 
+@pytest.mark.slow
 def test_what_a_given_size_loses_is_told():
     """The size that was the default took 7 % off a torus without a word."""
     shape = surfaces.torus()
@@ -128,6 +129,7 @@ def runs(process: int) -> bool:
         return False
 
 
+@pytest.mark.quick(3)
 @pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
 def test_a_mesher_ends_with_whoever_started_it(tmp_path, end):
     """A cancelled mesher ran on for minutes."""

@@ -39,6 +39,7 @@ def test_a_box_is_filled_without_gap_or_overlap():
     assert len(fine.surface_faces) == 4 * len(mesh.surface_faces)
 
 
+@pytest.mark.slow
 def test_what_a_sphere_loses_falls_with_the_square_of_the_size(ball):
     whole = 4 / 3 * np.pi * RADIUS**3
     fine = refine(ball, onto_sphere)

@@ -54,6 +54,7 @@ def test_netgen_fills_the_wrap_and_one_line_names_the_package(without_ftetwild):
     assert mesh.volume == pytest.approx(4 / 3 * np.pi * RADIUS**3, rel=0.04)
 
 
+@pytest.mark.slow
 def test_where_netgen_fails_too_the_error_names_the_package(without_ftetwild, monkeypatch):
     def fail(_filling):
         raise MesherFailedError("NETGEN crashed")

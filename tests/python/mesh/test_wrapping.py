@@ -105,6 +105,7 @@ def test_parts_of_a_field():
         wrap(field, labels, 3, 40)
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize("damage", ["none", "inside out", "turned", "doubled", "open"])
 def test_the_field_of_a_ball(damage):
     ball = trimesh.creation.icosphere(subdivisions=4, radius=0.5)

@@ -88,6 +88,7 @@ def test_demo_meshes_have_ten_nodes_an_element(name):
     assert (low / high).min() > 0.19
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["doll", "kidney", "liver"])
 def test_demo_meshes_fill_their_shapes(name, monkeypatch):
     """The volume is that where the implicit shape is negative."""

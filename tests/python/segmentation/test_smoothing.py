@@ -20,6 +20,7 @@ def enclosed(smooth: Boundary) -> float:
     return float(np.einsum("ij,ij->", np.cross(corners[:, 0], corners[:, 1]), corners[:, 2])) / 6
 
 
+@pytest.mark.quick(3)
 @pytest.mark.parametrize("rotation", [None, turned(), turned() @ np.diag([-1.0, 1, 1])], ids=str)
 def test_ellipsoid_in_voxels_of_a_ct(rotation):
     semi = np.array([50.0, 35.0, 25.0])

@@ -53,6 +53,7 @@ def test_the_same_bits_again_and_with_any_number_of_threads(block_green, tmp_pat
         assert run.stdout.strip() == digest(recording)
 
 
+@pytest.mark.slow
 def test_the_same_bits_from_a_store_of_any_number_of_threads(block, tmp_path):
     """What is precomputed does not depend on the threads either."""
     digests = set()

@@ -55,6 +55,7 @@ def distances(tool: str, origin: np.ndarray, points: np.ndarray) -> np.ndarray:
     return np.where(np.linalg.norm(away[..., :2], axis=-1) < RADIUS - 1.5e-3, -away[..., 2], np.inf)
 
 
+@pytest.mark.quick(3)
 @pytest.mark.parametrize("depth", [1e-3, 3e-3, 6e-3, 10e-3])
 @pytest.mark.parametrize("tool", TOOLS)
 def test_the_drawn_surface_of_a_hyperelastic_body_meets_the_tool(greens, tool, depth):

@@ -51,6 +51,7 @@ def put(simulation, tool, x, depth):
     raise AssertionError("the force does not settle")
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize("contact", ["local", "patch"])
 def test_a_tool_outside_feels_nothing_and_is_told(stores, contact):
     first, whole = stores

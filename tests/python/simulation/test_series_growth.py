@@ -105,6 +105,7 @@ def settled_force(simulation: Simulation, place: tuple[float, float, float]) -> 
     return float(simulation.frame().forces[0][2])
 
 
+@pytest.mark.slow
 def test_a_script_waits_for_the_series(beam):
     forces = pressed(beam)
     assert np.array_equal(forces, pressed(with_series(beam)))

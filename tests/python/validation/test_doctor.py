@@ -245,6 +245,7 @@ def test_this_machine_is_examined(monkeypatch, tmp_path):
     assert doctor.as_text(found).splitlines()[-1].startswith("1 kHz: ")
 
 
+@pytest.mark.slow
 @pytest.mark.browser
 @pytest.mark.skipif(shutil.which("chromium") is None, reason="no Chromium (Debian: apt install chromium)")
 def test_the_page_is_served_and_drawn(monkeypatch):

@@ -213,6 +213,7 @@ def reachable(page, selector: str) -> bool:
 BUTTONS = ("#show-cutaway", "#show-plots", "#grab", "#pin", "#reset", "#reset-view", "#screenshot", "#tab-loop")
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize("sheet", ["half", "tall"])
 def test_all_is_within_reach_on_a_phone(phone, sheet):
     if sheet == "tall":

@@ -36,6 +36,7 @@ def test_a_deep_press_of_a_neo_hookean_liver_states_its_error(chromium, cache):
     assert program.stop() == 0
 
 
+@pytest.mark.slow
 def test_a_deep_press_of_a_linear_liver_warns(page):
     """The paper's liver, which `program` has, is linear."""
     press_15_mm(page)

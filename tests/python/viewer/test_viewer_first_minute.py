@@ -162,6 +162,7 @@ def test_the_key_of_plots_opens_more(chromium, program):
         assert page.locator("#plots").is_visible()
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize("more", [False, True])
 def test_tab_reaches_every_control_and_each_has_a_name(chromium, program, more):
     with opened(chromium, program, more=more) as page:

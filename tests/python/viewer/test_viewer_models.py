@@ -48,6 +48,7 @@ LONG = {
 }
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize("phase", LONG)
 def test_long_work_is_cancelled(built, monkeypatch, tmp_path, phase):
     """The page is free at once; the body shown goes on, and another model may be chosen."""

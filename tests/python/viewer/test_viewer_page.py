@@ -68,6 +68,7 @@ def shown(page, name: str) -> float:
     return float(page.get_by_test_id(name).inner_text().split()[0].replace(",", "").replace("\u2212", "-"))
 
 
+@pytest.mark.slow
 def test_a_press_begins_at_the_surface_and_comes_to_a_gentle_depth(page):
     x, y = page.evaluate("window.palpate.pickPoint()")
     # Seen by the page itself, from the event on: it may be long until a test sees it.

@@ -168,6 +168,7 @@ async def touched(server, client, ball) -> None:
     assert isinstance(server.session, Session)
 
 
+@pytest.mark.slow
 def test_a_body_of_the_page_keeps_its_editor_and_reports_its_recording(ball, saves, shared_cache):
     async def session():
         async with empty_page(saves) as (server, client):

@@ -67,7 +67,8 @@ const THIN: [f64; 2] = [0.5, 1.0];
 /// of the first.
 const SECOND_WIDTH: f64 = 1.5;
 const LEAST_APART: f64 = 0.4;
-/// Least `b` over the tool's radius in a body of one material. The error of the elements is a share of `c_half(b)`, so that it would
+/// Least `b` over the tool's spreading radius in a body of one material. The error of the elements is a share of `c_half(b)`, so that
+/// it would
 /// grow as the mesh is refined if `b` followed the elements alone.
 const EVEN_WIDTH: f64 = 1.1;
 /// How fast the regular part may fall and rise with the square of the contact radius, over `1 / (E* R^3)` (see
@@ -185,13 +186,13 @@ pub struct CompliantBody<'a> {
 }
 
 impl RegularCompliance {
-    /// For a tool of `radius`, m, on a device that renders up to `max_stiffness`, N/m: near a support the patch's
-    /// compliance is raised evenly to what the device can render.
-    pub fn new(body: CompliantBody<'_>, radius: f64, max_stiffness: f64) -> Self {
+    /// For a tool of a radius, and of that of the sphere whose largest contact spreads a force as far, m, on a device that renders up
+    /// to `max_stiffness`, N/m: near a support the patch's compliance is raised evenly to what the device can render.
+    pub fn new(body: CompliantBody<'_>, radii: [f64; 2], max_stiffness: f64) -> Self {
         let count = body.smooth.fans().len();
         let block = |(scratch, patch): &mut (PatchScratch, Patch), fan: usize| {
             if body.smooth.touchable[fan] {
-                fan_compliance(body, fan, radius, max_stiffness, scratch, patch)
+                fan_compliance(body, fan, radii, max_stiffness, scratch, patch)
             } else {
                 FanCompliance::default()
             }
@@ -288,7 +289,7 @@ impl Probe<'_> {
 fn fan_compliance(
     body: CompliantBody<'_>,
     rank: usize,
-    radius: f64,
+    [radius, spreading_radius]: [f64; 2],
     max_stiffness: f64,
     scratch: &mut PatchScratch,
     patch: &mut Patch,
@@ -299,7 +300,7 @@ fn fan_compliance(
     let mut probe =
         Probe { body, centre: centre_of(&body.green.surface, fan), spacing, thin: 0.0, least, scratch, patch };
     let floor = match body.moduli.homogeneous {
-        true => EVEN_WIDTH * radius,
+        true => EVEN_WIDTH * spreading_radius,
         false => (SAME_MOMENT * reference_area(radius)).sqrt(),
     };
     let (compliance, width) = probe.compliance((SPACINGS * spacing).max(floor));

@@ -8,7 +8,7 @@ use crate::Result;
 use crate::arrays_file::ArraysKind;
 
 /// Version of the computation and of the file's layout; part of the key.
-const VERSION: u32 = 12;
+const VERSION: u32 = 13;
 const KIND: ArraysKind = ArraysKind { format: "palpate-contact", name: "file of contacts", version: VERSION };
 /// Suffix of the files, after the beginning of the key.
 const ENDING: &str = "contact.palpate";
@@ -18,16 +18,16 @@ const DIGITS: usize = 16;
 const MAX_FILES: usize = 16;
 
 impl RegularCompliance {
-    /// Reads the file beside the store of the body, for a tool of `radius`, m, on a device up to `max_stiffness`, N/m. Computes and
+    /// Reads the file beside the store of the body, for the arguments of [`Self::new`]. Computes and
     /// writes it if it is missing or damaged. The result is the same if it cannot be written.
-    pub fn load_or_compute(body: CompliantBody<'_>, radius: f64, max_stiffness: f64) -> Self {
-        let Some(store) = &body.green.path else { return Self::new(body, radius, max_stiffness) };
-        let key = key(body, radius, max_stiffness);
+    pub fn load_or_compute(body: CompliantBody<'_>, radii: [f64; 2], max_stiffness: f64) -> Self {
+        let Some(store) = &body.green.path else { return Self::new(body, radii, max_stiffness) };
+        let key = key(body, radii, max_stiffness);
         let path = store.with_extension(format!("{}.{ENDING}", &key[..DIGITS]));
         if let Some(found) = load(&path, &key, body.smooth.fans().len()) {
             return found;
         }
-        let computed = Self::new(body, radius, max_stiffness);
+        let computed = Self::new(body, radii, max_stiffness);
         if save(&computed, &path, &key).is_ok() {
             remove_oldest(store);
         }
@@ -68,14 +68,15 @@ fn files_of(store: &Path) -> Vec<PathBuf> {
 }
 
 /// Hex BLAKE3 hash of everything that determines the blocks.
-fn key(body: CompliantBody<'_>, radius: f64, max_stiffness: f64) -> String {
+fn key(body: CompliantBody<'_>, radii: [f64; 2], max_stiffness: f64) -> String {
     let mut hash = blake3::Hasher::new();
     hash.update(format!("palpate contact {VERSION} {}", body.green.key).as_bytes());
     for numbers in [
         &body.moduli.youngs[..],
         &body.moduli.poissons[..],
         body.moduli.strain_terms.as_flattened(),
-        &[radius, max_stiffness, f64::from(u8::from(body.moves)), f64::from(u8::from(body.moduli.homogeneous))],
+        &radii,
+        &[max_stiffness, f64::from(u8::from(body.moves)), f64::from(u8::from(body.moduli.homogeneous))],
     ] {
         hash.update(&(numbers.len() as u64).to_le_bytes());
         hash.update(bytemuck::cast_slice(numbers));

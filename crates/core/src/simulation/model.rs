@@ -206,5 +206,6 @@ fn regular_compliance(body: &BodyModel, tool: &ToolModel) -> Result<Option<Arc<R
     let (smooth, moduli, moves) = (&local.smooth, &local.moduli, body.moves());
     let inverse_sizes = &local.inverse_sizes;
     let compliant = CompliantBody { green, geometry, smooth, moduli, inverse_sizes, moves };
-    Ok(Some(Arc::new(RegularCompliance::load_or_compute(compliant, tool.radius, tool.max_stiffness))))
+    let radii = [tool.radius, tool.spreading_radius()];
+    Ok(Some(Arc::new(RegularCompliance::load_or_compute(compliant, radii, tool.max_stiffness))))
 }

@@ -33,6 +33,20 @@ pub struct ToolModel {
     pub max_stiffness: f64,
 }
 
+/// Radius of the sphere whose largest contact spreads a force as far as a flat punch, over that of the punch. The pressure of a punch
+/// has the second moment `2 R^2/3`. That of the sphere is `2 a^2/5` with `a = 0.87 R`, for which its patch is made.
+const FLAT: f64 = 1.48;
+
+impl ToolModel {
+    /// Radius of the sphere whose largest contact spreads a force as far as that of the tool, m.
+    pub fn spreading_radius(&self) -> f64 {
+        match self.shape {
+            ToolShape::Punch { .. } => FLAT * self.radius,
+            _ => self.radius,
+        }
+    }
+}
+
 /// Half the greatest width of the part of a shape that can touch a plane, m: contacts reach no farther from their middle.
 pub fn contact_size(shape: &ToolShape) -> f64 {
     match *shape {
