@@ -6,7 +6,7 @@ ARGS ?=
 # Tests start hundreds of processes: where compiled modules are not kept, each of them compiles SciPy and the like anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test campaigns install web site wheel sdist other-build sanitize lint check-systems docs viewer check-tools clean
+.PHONY: demo test campaigns install web site wheel sdist other-build sanitize lint check-systems docs viewer page-checks check-tools clean
 .DEFAULT_GOAL := demo
 
 check-tools:
@@ -43,6 +43,9 @@ viewer/node_modules/.checks: viewer/node_modules/.package-lock.json | $(PAGE)
 	@touch -r $(PAGE) $< && touch $@
 
 viewer: $(PAGE)
+
+page-checks: $(PAGE) viewer/node_modules/.checks
+	cd viewer && npm run --silent check
 
 # The program of pages without a server (docs/web.md): WebAssembly, for whose target scripts/build_web.sh cares.
 WEB := python/palpate/viewer/web/palpate.wasm
@@ -81,25 +84,24 @@ sdist: $(BIN)/python $(PAGE) $(WEB)
 demo: $(VENV)/.installed $(PAGE)
 	$(BIN)/palpate demo $(ARGS)
 
-# Two processes: much of the time goes into waiting for browsers, meshers and servers; tests/python/conftest.py gives what
+# Three processes: much of the time goes into waiting for browsers, meshers and servers; tests/python/conftest.py gives what
 # each of them takes on, and in which order.
 # OpenBLAS on one thread each: its threads wait for one another by spinning, which took two thirds of the tests of modes.
-PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --quiet --numprocesses 2 --dist loadgroup --no-loadscope-reorder
+PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --quiet --numprocesses 3 --dist loadgroup --no-loadscope-reorder
 # --tests leaves out documentation, which holds none; --lib would build crates of which nothing is tested so.
 CARGO_TEST := cargo test --release --quiet --workspace --tests
 test: | check-tools
-	@# npm and pip wait for downloads while cargo compiles.
+	@# npm and pip wait for downloads while cargo compiles, and the extension for the tests to be compiled.
 	$(CARGO_TEST) --no-run & \
-		$(MAKE) --no-print-directory $(PAGE) viewer/node_modules/.checks $(VENV)/.installed; status=$$?; \
+		$(MAKE) --no-print-directory page-checks $(VENV)/.installed; status=$$?; \
 		wait $$! && exit $$status
 	$(CARGO_TEST)
-	cd viewer && npm run --silent check
 	$(PYTEST) -m "not slow" $(ARGS)
 
 # Slow tests and campaigns of random touches, presses, writers and answers. CI runs a tenth of their files after `make
 # test`, with a share of the cases; `make campaigns ARGS=--whole` takes all, about an hour.
 campaigns: $(VENV)/.installed $(PAGE) $(WEB)
-	$(PYTEST) -m slow $(ARGS)
+	$(PYTEST) -m slow --numprocesses 2 $(ARGS)
 
 # After `make test`: what the release build has recorded, a build that is not optimised makes again bit for bit.
 OTHER_BUILD := -p palpate-servo --no-default-features --test across_builds
