@@ -15,10 +15,10 @@
 use glam::DVec3;
 
 use super::add_contact;
-use super::foot_jumps::DEEPEST_START;
+use super::foot_jumps::{DEEPEST_START, are_merged_planes};
 use super::wrench::{largest_overlap, placed_shape};
 use crate::contact::Concavities;
-use crate::contact::footprint::{OtherPlanes, PlacedShape};
+use crate::contact::footprint::{OtherPlanes, PlacedShape, Plane};
 use crate::contact::smooth::FootPoint;
 use crate::simulation::contacts::{Contact, Contacts, LocalContact, Mode, STRAIN_REQUESTS};
 use crate::simulation::law::TickMemory;
@@ -33,6 +33,8 @@ const PENDING_DISTANCE: f64 = 0.4;
 /// Least distance of two contacts, over the tool's radius, and largest cosine of the angle between their normals.
 const LEAST_DISTANCE: f64 = 0.25;
 const PARALLEL: f64 = 0.97;
+/// Steps in which the plane of a wall is found.
+const WALL_STEPS: usize = 4;
 
 /// Adds contacts of a sphere at further places that it is near to.
 pub fn find_additional_contacts(
@@ -124,15 +126,21 @@ pub fn find_wall_contact(model: &Model, state: &mut State, memory: TickMemory<'_
     if let Some(own) = footprint.others.iter_mut().find(|other| other.is_none()) {
         *own = Some(local.plane());
     }
-    let contact = placed_shape(&model.tools[tool].shape, &local, local.relative_position);
-    let at =
-        PlacedShape { position: local.relative_position, contact_normal: plane.normal, penetration: 0.0, ..contact };
-    footprint.near.find(pressed_surface, &model.bodies[body].query, &at);
+    let placed = placed_shape(&model.tools[tool].shape, &local, local.relative_position);
     let weights = &mut memory.weight_scratch.weights;
-    let Some(wall) = footprint.find(&at, (&pressed_surface.fine, &own.smooth), plane, weights) else {
-        return;
+    let mut wall_on = |plane: Plane| {
+        let at = PlacedShape { contact_normal: plane.normal, penetration: 0.0, ..placed };
+        footprint.near.find(pressed_surface, &model.bodies[body].query, &at);
+        footprint.find(&at, (&pressed_surface.fine, &own.smooth), plane, weights)
     };
-    if weights.is_outside() {
+    // The plane of a single piece turns to that of all those around it.
+    let Some(mut wall) = wall_on(plane) else { return };
+    for _ in 1..WALL_STEPS {
+        let Some(turned) = wall_on(Plane { point: wall.origin, normal: wall.normal }) else { return };
+        wall = turned;
+    }
+    let is_parallel = |other: &Plane| are_merged_planes(other.normal, wall.normal);
+    if weights.is_outside() || footprint.others.iter().flatten().any(is_parallel) {
         return;
     }
     // The force starts from zero: overlap beyond the depth that the tool can have reached does not count.

@@ -293,10 +293,15 @@ pub fn continue_contact(tool: &ToolModel, contact: &mut Contact) -> bool {
     !(fades || far)
 }
 
+/// Whether planes with these normals are one contact of a tool that is not a sphere.
+pub fn are_merged_planes(first: DVec3, second: DVec3) -> bool {
+    first.dot(second) > MERGED_COSINE
+}
+
 /// Whether two contacts of a tool have merged. One contact of a tool that is not a sphere covers a whole plane.
 fn have_merged(tool: &ToolModel, first: &FootPoint, second: &FootPoint) -> bool {
     match tool.shape.needs_cells() {
-        true => first.normal.dot(second.normal) > MERGED_COSINE,
+        true => are_merged_planes(first.normal, second.normal),
         false => first.position.distance(second.position) < MERGED_DISTANCE * tool.radius,
     }
 }
