@@ -33,8 +33,9 @@ const PENDING_DISTANCE: f64 = 0.4;
 /// Least distance of two contacts, over the tool's radius, and largest cosine of the angle between their normals.
 const LEAST_DISTANCE: f64 = 0.25;
 const PARALLEL: f64 = 0.97;
-/// Steps in which the plane of a wall is found.
+/// Most steps in which the plane of a wall is found, and the cosine of its turn from which on it is settled.
 const WALL_STEPS: usize = 4;
+const SETTLED: f64 = 0.999;
 
 /// Adds contacts of a sphere at further places that it is near to.
 pub fn find_additional_contacts(
@@ -137,7 +138,11 @@ pub fn find_wall_contact(model: &Model, state: &mut State, memory: TickMemory<'_
     let Some(mut wall) = wall_on(plane) else { return };
     for _ in 1..WALL_STEPS {
         let Some(turned) = wall_on(Plane { point: wall.origin, normal: wall.normal }) else { return };
+        let is_settled = turned.normal.dot(wall.normal) > SETTLED;
         wall = turned;
+        if is_settled {
+            break;
+        }
     }
     let is_parallel = |other: &Plane| are_merged_planes(other.normal, wall.normal);
     if weights.is_outside() || footprint.others.iter().flatten().any(is_parallel) {
