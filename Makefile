@@ -84,10 +84,8 @@ sdist: $(BIN)/python $(PAGE) $(WEB)
 demo: $(VENV)/.installed $(PAGE)
 	$(BIN)/palpate demo $(ARGS)
 
-# Three processes: much of the time goes into waiting for browsers, meshers and servers; tests/python/conftest.py gives what
-# each of them takes on, and in which order.
 # OpenBLAS on one thread each: its threads wait for one another by spinning, which took two thirds of the tests of modes.
-PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --quiet --numprocesses 3 --dist loadgroup --no-loadscope-reorder
+PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --quiet --dist loadgroup --no-loadscope-reorder
 # --tests leaves out documentation, which holds none; --lib would build crates of which nothing is tested so.
 CARGO_TEST := cargo test --release --quiet --workspace --tests
 test: | check-tools
@@ -96,12 +94,14 @@ test: | check-tools
 		$(MAKE) --no-print-directory page-checks $(VENV)/.installed; status=$$?; \
 		wait $$! && exit $$status
 	$(CARGO_TEST)
-	$(PYTEST) -m "not slow" $(ARGS)
+	@# Three processes: much of the time goes into waiting for browsers, meshers and servers; tests/python/conftest.py gives what
+	@# each of them takes on, and in which order.
+	$(PYTEST) --numprocesses 3 -m "not slow" $(ARGS)
 
 # Slow tests and campaigns of random touches, presses, writers and answers. CI runs a sixteenth of their files after `make
 # test`, with a share of the cases; `make campaigns ARGS=--whole` takes all, about an hour.
 campaigns: $(VENV)/.installed $(PAGE) $(WEB)
-	$(PYTEST) -m slow --numprocesses 2 $(ARGS)
+	$(PYTEST) --numprocesses 2 -m slow $(ARGS)
 
 # After `make test`: what the release build has recorded, a build that is not optimised makes again bit for bit.
 OTHER_BUILD := -p palpate-servo --no-default-features --test across_builds

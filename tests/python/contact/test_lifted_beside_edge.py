@@ -7,13 +7,12 @@ from an edge kept the slopes of its softer compliance in the memory of its cells
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 import pytest
+from crossings import polyline
 
 import palpate
-from palpate.validation.verify.contact.loop import loop_of, sphere, straight
+from palpate.validation.verify.contact.loop import loop_of, sphere
 from palpate.validation.verify.contact.measures import given_out
 from palpate.validation.verify.grids import box
 
@@ -24,12 +23,6 @@ BEGIN, END, HEIGHT = 0.003, 0.02, 0.033
 JUMP, GIVEN = 0.05, 2e-4
 
 
-def way(corners: list[tuple[float, float, float]], step: float = STEP) -> np.ndarray:
-    """Path through places, m."""
-    at = np.array(corners)
-    return np.concatenate([at[:1], *(straight(start, end, step)[1:] for start, end in itertools.pairwise(at))])
-
-
 @pytest.mark.slow
 def test_a_contact_that_slides_away_from_an_edge_has_the_force_of_a_straight_press():
     mesh = box((10, 10, 7), (SIDE, SIDE, 0.05), quadratic=True)
@@ -37,7 +30,7 @@ def test_a_contact_that_slides_away_from_an_edge_has_the_force_of_a_straight_pre
     green = palpate.precompute(body, touch=lambda at: at[:, 0] > 0.04, progress=False)
     high, low = SIDE + RADIUS + 5e-4, SIDE + RADIUS - DEPTH
     corners = [(high, BEGIN), (low, BEGIN), (low, END), (high, END), (high, BEGIN)]
-    path = way([(x, y, HEIGHT) for x, y in corners])
+    path = polyline([(x, y, HEIGHT) for x, y in corners], STEP)
     loop = loop_of(body, green, [sphere(RADIUS)])
     forces = loop.play(path).computed_forces
     largest = np.linalg.norm(forces, axis=1).max()
@@ -46,7 +39,7 @@ def test_a_contact_that_slides_away_from_an_edge_has_the_force_of_a_straight_pre
     given, most = given_out(path[None], forces[None])
     assert abs(given[0]) < GIVEN * most[0]
     slid = forces[np.flatnonzero((path[:, 0] == low) & (path[:, 1] == END))[0]]
-    pressed = loop.play(way([(high, END, HEIGHT), (low, END, HEIGHT)])).computed_forces[-1]
+    pressed = loop.play(polyline([(high, END, HEIGHT), (low, END, HEIGHT)], STEP)).computed_forces[-1]
     assert np.linalg.norm(slid - pressed) < 1e-3 * np.linalg.norm(pressed)
 
 
@@ -58,7 +51,7 @@ def test_an_ellipsoid_that_comes_back_from_an_edge_has_its_force_again():
     tool = {"shape": "ellipsoid", "semi_axes": (0.004, 0.003, 0.003), "contact": "local", "friction": 0.0}
     clear, deep = -0.0035, -0.0025
     corners = [(clear, 0.043), (deep, 0.043), (deep, 0.0492), (deep, 0.043), (clear, 0.043)]
-    path = way([(x, 0.04, z) for x, z in corners], 1e-5)
+    path = polyline([(x, 0.04, z) for x, z in corners], 1e-5)
     # Its first axis across the edge, its third one out of the face.
     turned = np.tile([np.sqrt(0.5), 0.0, -np.sqrt(0.5), 0.0], (len(path), 1))
     forces = loop_of(body, green, [tool]).play(path, turned).computed_forces

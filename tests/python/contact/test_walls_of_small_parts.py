@@ -10,9 +10,10 @@ from functools import cache
 
 import numpy as np
 import pytest
+from crossings import polyline
 
 import palpate
-from palpate.validation.verify.contact.loop import loop_of, straight
+from palpate.validation.verify.contact.loop import loop_of
 from palpate.validation.verify.contact.measures import given_out
 
 CAPSULE = {"shape": "capsule", "radius": 0.004, "length": 0.014}
@@ -52,8 +53,7 @@ def doll() -> tuple[palpate.Body, palpate.GreensFunction]:
 def test_a_bump_is_pressed_once(name):
     tool, points, orientation = PATHS[name]
     above, deep, slid = map(np.array, points)
-    there = np.vstack([straight(above, deep, STEP), straight(deep, slid, STEP)])
-    path = np.vstack([there, there[::-1]])
+    path = polyline([above, deep, slid, deep, above], STEP)
     simulation = loop_of(*doll(), [{**tool, "friction": 0.0}])
     turned = np.array(orientation) / np.linalg.norm(orientation)
     forces = simulation.play(path, np.tile(turned, (len(path), 1))).computed_forces

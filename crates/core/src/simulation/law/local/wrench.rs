@@ -237,7 +237,7 @@ mod tests {
     fn the_wrench_on_a_ball_is_the_gradient_of_the_energy() {
         let body = Body::new(ball(12));
         for (shape, out) in shapes() {
-            for k in 0..4 {
+            for k in 0..6 {
                 let turn = f64::from(k);
                 let orientation = DQuat::from_euler(glam::EulerRot::XYZ, 0.25 * turn.sin(), 0.25 * turn.cos(), turn);
                 let towards = DVec3::new(0.3 * (2.0 * turn).cos(), 0.3 * (2.0 * turn).sin(), 1.0).normalize();
