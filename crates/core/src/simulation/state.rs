@@ -26,6 +26,11 @@ pub struct EntryDepth {
     pub previous: f64,
 }
 
+impl EntryDepth {
+    /// Of a tool that is inside at no known depth: the next depth that is known is where its force starts.
+    pub const INSIDE: Self = Self { threshold: f64::INFINITY, previous: f64::INFINITY };
+}
+
 /// State of a tool.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ToolState {

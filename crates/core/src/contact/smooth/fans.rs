@@ -1,6 +1,6 @@
 //! Fans: the faces around a surface node on one smooth side of it, with the quadric fitted to them.
 //!
-//! Edges that turn by more than [`CREASE`] are creases. The triangles around a node fall into fans between its creases; a
+//! Edges that turn by more than [`CREASE`] are creases, unless they end within a smooth surface. The triangles around a node fall into fans between its creases; a
 //! node of a smooth surface has one, the corner of a cube three. A fan has a normal and a curvature of its own, from the
 //! least-squares quadric `z = a x + b y + (c x^2 + 2 d x y + e y^2) / 2` through the node and weighted by its neighbours
 //! (Cazals and Pouget, 2005).
@@ -13,6 +13,8 @@ use crate::tensor::outer;
 
 /// Cosine of the turn beyond which an edge is a crease: 50 degrees.
 const CREASE: f64 = 0.642_787_609_686_539_4;
+/// Cosine of the turn from which an edge that ends within a smooth surface is a crease too: 80 degrees.
+const SHARP_CREASE: f64 = 0.173_648_177_666_930_3;
 /// Reach of a fan's blending weight over its longest edge.
 const REACH: f64 = 1.8;
 /// Largest distance of neighbours in the fit, over the longest edge.
@@ -73,10 +75,45 @@ impl Fans {
     }
 }
 
+/// Edges of each triangle that are creases. One that ends at a node with no other crease does not part the surface there: it comes
+/// from a coarse mesh of something round, as that of a scan. The smooth surface and the drawn edge, up to a millimetre above it,
+/// would then hold the same tool at different depths.
 fn creases(surface: &Surface) -> Vec<[bool; 3]> {
-    let turns =
-        |t: usize, other: u32| other == u32::MAX || surface.normals[t].dot(surface.normals[other as usize]) < CREASE;
-    surface.neighbours.iter().enumerate().map(|(t, across)| across.map(|other| turns(t, other))).collect()
+    let cosine = |t: usize, other: u32| match other {
+        u32::MAX => -1.0,
+        other => surface.normals[t].dot(surface.normals[other as usize]),
+    };
+    let edges_of = |t: usize| surface.neighbours[t].into_iter().enumerate().map(move |(k, other)| (t, k, other));
+    let ends =
+        |t: usize, k: usize| [surface.triangles[t][k], surface.triangles[t][(k + 1) % 3]].map(|node| node as usize);
+    let mut creases = vec![[false; 3]; surface.triangles.len()];
+    let (mut count, mut soft) = (vec![0u32; surface.positions.len()], Vec::new());
+    for (t, k, other) in (0..creases.len()).flat_map(edges_of) {
+        creases[t][k] = cosine(t, other) < CREASE;
+        if creases[t][k] && (other == u32::MAX || other as usize > t) {
+            ends(t, k).into_iter().for_each(|node| count[node] += 1);
+            if cosine(t, other) > SHARP_CREASE {
+                soft.push((t, k, other as usize));
+            }
+        }
+    }
+    loop {
+        let before = soft.len();
+        soft.retain(|&(t, k, other)| {
+            let ends = ends(t, k);
+            let parts = ends.iter().all(|&node| count[node] > 1);
+            if !parts {
+                ends.into_iter().for_each(|node| count[node] -= 1);
+                creases[t][k] = false;
+                let across = surface.neighbours[other].iter().position(|&back| back as usize == t);
+                across.into_iter().for_each(|k| creases[other][k] = false);
+            }
+            parts
+        });
+        if soft.len() == before {
+            return creases;
+        }
+    }
 }
 
 /// Joins the corners of triangles that meet at a node across edges that are no creases.

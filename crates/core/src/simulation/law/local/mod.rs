@@ -135,7 +135,8 @@ fn first_foot(
     Some((foot, tool.radius - foot.distance))
 }
 
-/// The footprint, as a foot, of a tool that is not a sphere, and its depth in the pieces below, m. `None` if no piece is near.
+/// The footprint, as a foot, of a tool that is not a sphere, and its depth in the pieces below, m. Where no piece is near, what the
+/// next contact begins from: a tool far inside the body, as one may start, has not come in through the surface.
 ///
 /// The contact lies on the side that the tool came from: at the first piece that it was near to on its way.
 fn starting_footprint(
@@ -144,13 +145,14 @@ fn starting_footprint(
     pressed: &PressedSurface,
     place: DVec3,
     weight_scratch: &mut WeightScratch,
-) -> Option<(FootPoint, f64)> {
+) -> Result<(FootPoint, f64), EntryDepth> {
     let (body, shape) = (approach.body, &approach.tool.shape);
     let (drawn, rotation, thickness) = (body.drawn(), DMat3::from_quat(approach.orientation), shape.thickness());
-    let closest = body.closest(place + rotation * shape.centre())?;
+    let Some(closest) = body.closest(place + rotation * shape.centre()) else { return Err(EntryDepth::default()) };
     if closest.signed_distance > shape.bounding_radius() + pressed.margin + approach.displacement.length() {
-        return None;
+        return Err(EntryDepth::default());
     }
+    let nowhere = if closest.signed_distance < 0.0 { EntryDepth::INSIDE } else { EntryDepth::default() };
     let WeightScratch { footprint, weights, .. } = weight_scratch;
     let has_jumped = approach.displacement.length() > JUMP * approach.tool.radius;
     let displacement = if has_jumped { DVec3::ZERO } else { approach.displacement };
@@ -166,14 +168,15 @@ fn starting_footprint(
             break;
         }
     }
-    let first_plane = first_plane?;
+    let first_plane = first_plane.ok_or(nowhere)?;
     let at =
         PlacedShape { position: place, penetration: displacement.length(), contact_normal: first_plane.normal, ..at };
     footprint.near.find(pressed, drawn.query, &at);
-    let contact_footprint = footprint.find(&at, (&pressed.fine, &local.smooth), first_plane, weights)?;
+    let found = footprint.find(&at, (&pressed.fine, &local.smooth), first_plane, weights);
+    let contact_footprint = found.ok_or(nowhere)?;
     let faces = |near: &&NearPiece| near.normal.dot(contact_footprint.normal) > 0.0;
     let deepest = footprint.near.pieces.iter().filter(faces).map(|near| -near.distance).fold(0.0, f64::max);
-    Some((contact_footprint.foot(place), deepest))
+    Ok((contact_footprint.foot(place), deepest))
 }
 
 /// Depth of a tool at `place` below the plane through a foot, m; negative above it.
@@ -215,11 +218,15 @@ impl Law for Local {
         weight_scratch.near.invalidate();
         let start = match approach.pressed_surface {
             Some(pressed) => starting_footprint(approach, local, pressed, relative_position, weight_scratch),
-            None => starting_foot(approach, local, relative_position, &mut weight_scratch.near),
+            None => starting_foot(approach, local, relative_position, &mut weight_scratch.near)
+                .ok_or_else(EntryDepth::default),
         };
-        let Some((foot, depth)) = start else {
-            *entry = EntryDepth::default();
-            return Ok(None);
+        let (foot, depth) = match start {
+            Ok(start) => start,
+            Err(nowhere) => {
+                *entry = nowhere;
+                return Ok(None);
+            }
         };
         let before = std::mem::replace(&mut entry.previous, depth.max(0.0));
         entry.threshold = entry.threshold.min(entry.previous);
@@ -235,12 +242,20 @@ impl Law for Local {
         if depth <= entry.threshold && !starts_near {
             return Ok(None);
         }
+        // A tool that is no sphere is deeper below the plane of its contact than in the pieces around it.
+        let entry_depth = match approach.pressed_surface {
+            Some(_) if entry.threshold > 0.0 => {
+                let pose = (relative_position, DMat3::from_quat(approach.orientation));
+                depth_below(&approach.tool.shape, pose, &foot) - (depth - entry.threshold)
+            }
+            _ => entry.threshold,
+        };
         let local = LocalContact {
             tool_position: approach.position,
             orientation: approach.orientation,
             relative_position,
             previous_orientation: approach.orientation,
-            entry_depth: entry.threshold,
+            entry_depth,
             foot,
             part: 1.0,
             ..LocalContact::default()

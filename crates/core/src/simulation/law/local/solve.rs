@@ -352,7 +352,7 @@ fn evaluate_contacts(
                     let [node, ..] = model.bodies[body].loaded.triangles[local.responses[a].foot.triangle as usize];
                     state.tools[tool].refused[body] = Some(Refusal::NotTouchable(node));
                     // Where it becomes touchable again its force starts from zero, however deep the tool is.
-                    state.tools[tool].entry[body] = EntryDepth { threshold: f64::INFINITY, previous: f64::INFINITY };
+                    state.tools[tool].entry[body] = EntryDepth::INSIDE;
                 }
                 state.contacts.clear(slot);
                 return false;
