@@ -1,9 +1,9 @@
 """Without friction the force at a pose is the same, whichever way the tool has come there.
 
-An edge of a coarse organ that turns by a little more than its neighbours is no feature of the body. As a crease that ends
-after one element it held a sphere up to a millimetre above the smooth surface beside it: a tool that came in there was given
-no force, and felt half of it or less for as long as it slid. A tool that starts inside the body came into a contact as deep as
-it was, with all its force at once.
+An edge of a coarse organ that turns by a little more than its neighbours is no feature of the body. As a crease
+that ends after one element it held a sphere up to a millimetre above the smooth surface beside it: a tool that came in
+there was given no force, and felt half of it or less for as long as it slid. A tool that starts inside the body came
+into a contact as deep as it was, with all its force at once.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from palpate.validation.verify.contact.loop import loop_of
 from palpate.validation.verify.contact.measures import given_out
 
 STEP = 2e-5
-# A sphere's radius, m; above the surface of the built-in body, half a radius deep, and slid by 10 mm; over the place slid to.
+# A sphere's radius, m; above the surface of the built-in body, half a radius deep, slid by 10 mm; over that place.
 WAYS = {
     "liver": (
         0.004,
