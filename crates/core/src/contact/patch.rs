@@ -77,6 +77,19 @@ impl Patch {
         self.count = 0;
     }
 
+    /// Sets the weights if these are its nodes in their order; otherwise it has to be set anew.
+    pub(super) fn replace_weights(&mut self, mut nodes: impl Iterator<Item = (u32, f64)>) -> bool {
+        let mut own = self.nodes[..self.count].iter().zip(&mut self.weights);
+        let replace = |(&own, weight): (&u32, &mut f64)| match nodes.next() {
+            Some((node, new)) if node == own => {
+                *weight = new;
+                true
+            }
+            _ => false,
+        };
+        own.all(replace) && nodes.next().is_none()
+    }
+
     /// Adds a node, or to its weight where it is there already; false where there is no place.
     pub(super) fn add(&mut self, node: u32, weight: f64) -> bool {
         match self.nodes[..self.count].iter().position(|&known| known == node) {

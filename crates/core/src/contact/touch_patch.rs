@@ -48,8 +48,16 @@ impl TouchPatch {
         self.patch.scale(if touchable > 0.0 { all / touchable } else { 0.0 });
     }
 
-    /// Sets the touchable ones of these nodes with their weights; repeated nodes are summed.
-    pub fn blend(&mut self, green: &GreensFunction, nodes: impl Iterator<Item = (u32, f64)>) {
+    /// Empties the patch. A slot is to be emptied before another contact uses it: its columns may be those of another store.
+    pub fn clear(&mut self) {
+        self.patch.clear();
+    }
+
+    /// Sets the touchable ones of these nodes with their weights; repeated nodes are summed. Mostly they are the nodes that it has.
+    pub fn blend(&mut self, green: &GreensFunction, nodes: impl Iterator<Item = (u32, f64)> + Clone) {
+        if self.patch.replace_weights(nodes.clone()) {
+            return;
+        }
         self.patch.clear();
         for (node, weight) in nodes {
             let (place, column) = (self.patch.count, green.touchable(node as usize));

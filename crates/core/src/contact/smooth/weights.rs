@@ -144,7 +144,7 @@ impl FanWeights {
     }
 
     /// Rank of each fan and its weight.
-    pub fn iter(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+    pub fn iter(&self) -> impl Iterator<Item = (usize, f64)> + Clone + '_ {
         self.fans[..self.count].iter().zip(&self.weights).map(|(&fan, &weight)| (fan as usize, weight))
     }
 

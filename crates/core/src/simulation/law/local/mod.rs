@@ -191,6 +191,7 @@ fn add_contact(state: &mut State, new_contact: Contact) -> Option<usize> {
     let slot = contacts.empty(new_contact.additional)?;
     let serial = contacts.next_serial();
     contacts.put(slot, Contact { serial, ..new_contact });
+    contacts.patches[slot].clear();
     if let Some(pressures) = pressures.get_mut(slot) {
         *pressures = PressureState::default();
     }
