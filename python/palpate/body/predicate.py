@@ -79,11 +79,10 @@ def _check_number(node: ast.AST, text: str, plain: str) -> None:
         _check_number(node.right, text, plain)
     elif isinstance(node, ast.UnaryOp) and isinstance(node.op, (ast.USub, ast.UAdd)):
         _check_number(node.operand, text, plain)
-    elif isinstance(node, ast.Name) and (node.id in AXES or node.id in {"min", "max"}):
-        return
-    elif isinstance(node, ast.Constant) and isinstance(node.value, (int, float)) and not isinstance(node.value, bool):
-        return
-    else:
+    elif not (
+        (isinstance(node, ast.Name) and node.id in {*AXES, "min", "max"})
+        or (isinstance(node, ast.Constant) and type(node.value) in {int, float})
+    ):
         raise _refuse(node, text, plain)
 
 

@@ -13,34 +13,32 @@ import typer
 if TYPE_CHECKING:
     from palpate.viewer.server import ViewerServer
 
-Igtl = Annotated[
-    int | None,
-    typer.Option(
-        min=0, max=65535, help="Port of OpenIGTLink, such as 18944, for 3D Slicer and trackers; default: closed."
-    ),
-]
-IgtlHost = Annotated[
-    str, typer.Option(help="Address of OpenIGTLink; others than 127.0.0.1 let other machines move the tool.")
-]
-IgtlAxes = Annotated[Literal["RAS", "LPS"], typer.Option(help="Axes of OpenIGTLink's messages, in millimetres.")]
-IgtlFrom = Annotated[
-    str | None, typer.Option(help="HOST:PORT of an OpenIGTLink server that sends poses, such as PLUS, to be called.")
-]
-
 
 @dataclass(frozen=True)
 class LinkOptions:
     """What was asked for of OpenIGTLink."""
 
-    port: int | None = None
-    host: str = "127.0.0.1"
-    axes: Literal["RAS", "LPS"] = "RAS"
-    tracker: str | None = None
+    igtl: Annotated[
+        int | None,
+        typer.Option(
+            min=0, max=65535, help="Port of OpenIGTLink, such as 18944, for 3D Slicer and trackers; default: closed."
+        ),
+    ] = None
+    igtl_host: Annotated[
+        str, typer.Option(help="Address of OpenIGTLink; others than 127.0.0.1 let other machines move the tool.")
+    ] = "127.0.0.1"
+    igtl_axes: Annotated[
+        Literal["RAS", "LPS"], typer.Option(help="Axes of OpenIGTLink's messages, in millimetres.")
+    ] = "RAS"
+    igtl_from: Annotated[
+        str | None,
+        typer.Option(help="HOST:PORT of an OpenIGTLink server that sends poses, such as PLUS, to be called."),
+    ] = None
 
     @property
     def is_asked(self) -> bool:
         """Whether anything is to be served or called."""
-        return self.port is not None or self.tracker is not None
+        return self.igtl is not None or self.igtl_from is not None
 
 
 @contextlib.contextmanager
@@ -51,11 +49,11 @@ def linked(server: ViewerServer, options: LinkOptions, folder: Path) -> Iterator
         return
     from palpate.openigtlink import Axes, Link, LinkServer
 
-    link = Link(lambda: getattr(server.session, "simulation", None), Axes(options.axes), folder)
-    tracker = None if options.tracker is None else _address(options.tracker)
-    with LinkServer(link, options.port, host=options.host, tracker=tracker) as served:
+    link = Link(lambda: getattr(server.session, "simulation", None), Axes(options.igtl_axes), folder)
+    tracker = None if options.igtl_from is None else _address(options.igtl_from)
+    with LinkServer(link, options.igtl, host=options.igtl_host, tracker=tracker) as served:
         if served.port is not None:
-            print(f"OpenIGTLink is at {options.host}:{served.port}, in mm and {options.axes}", flush=True)
+            print(f"OpenIGTLink is at {options.igtl_host}:{served.port}, in mm and {options.igtl_axes}", flush=True)
         yield
 
 

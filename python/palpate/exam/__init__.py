@@ -3,7 +3,7 @@
 from palpate.exam.course import Course, Trial, TrialAnswer
 from palpate.exam.file import ExamFile
 from palpate.exam.library import Library, Nodule
-from palpate.exam.observer import Observer, simulated_exam, simulated_exams
+from palpate.exam.observer import simulated_exam, simulated_exams
 from palpate.exam.psychometric import Estimate, contrast_at, estimate, proportion_correct
 from palpate.exam.record import Record
 from palpate.exam.result import Result
@@ -14,7 +14,6 @@ __all__ = [
     "ExamFile",
     "Library",
     "Nodule",
-    "Observer",
     "Record",
     "Result",
     "Trial",

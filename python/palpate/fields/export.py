@@ -6,6 +6,7 @@ Tensors are written by their six components in the order of VTK: xx, yy, zz, xy,
 from __future__ import annotations
 
 import os
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,12 +15,13 @@ import numpy as np
 
 from palpate.atomic import written_beside
 from palpate.errors import Error, MeshError
-from palpate.fields.principal import largest_magnitude
-from palpate.fields.stress import SurfaceStress
+from palpate.fields.picture import DeformedSurface, as_html, draw
+from palpate.fields.stress import SurfaceStress, largest_magnitude
 from palpate.input_file import require_writable
 
 if TYPE_CHECKING:
     import meshio
+    from matplotlib.figure import Figure
 
 FORMATS = {".vtu": "vtu", ".vtk": "vtk"}
 ROWS, COLUMNS = np.array([0, 1, 2, 0, 1, 0]), np.array([0, 1, 2, 1, 2, 2])
@@ -136,3 +138,51 @@ def as_pyvista(mesh: meshio.Mesh) -> Any:
     except ImportError:
         raise Error("to_pyvista needs pyvista: pip install pyvista") from None
     return pyvista.from_meshio(mesh)
+
+
+class Exportable(ABC):
+    """One body or several, with files, meshes and pictures of them."""
+
+    @abstractmethod
+    def to_meshio(self) -> meshio.Mesh:
+        """Return the body at rest with displacement, strain and stress at its nodes, as a mesh of meshio."""
+
+    @abstractmethod
+    def _drawn_surfaces(self) -> list[DeformedSurface]:
+        """Surfaces of a picture."""
+
+    def to_pyvista(self) -> Any:
+        """Give the same as :meth:`to_meshio` as pyvista's unstructured grid.
+
+        Raises
+        ------
+        Error
+            pyvista is not installed.
+
+        """
+        return as_pyvista(self.to_meshio())
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write what :meth:`to_meshio` gives as .vtu or .vtk, for ParaView; replaced only when complete.
+
+        Raises
+        ------
+        MeshError
+            Another ending, or no place for a file.
+
+        """
+        write_result(self.to_meshio(), path)
+
+    def plot(self, magnification: float = 1.0) -> Figure:
+        """Draw the deformed body, coloured by displacement, as a figure of matplotlib; ``savefig`` writes it.
+
+        Parameters
+        ----------
+        magnification
+            Of the displacements that are drawn; the colours tell the true ones.
+
+        """
+        return draw(self._drawn_surfaces(), magnification, repr(self))
+
+    def _repr_html_(self) -> str:
+        return as_html(repr(self), self._drawn_surfaces())

@@ -6,7 +6,7 @@ import contextlib
 import io
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -54,11 +54,6 @@ class Volume:
     tets: np.ndarray  # (m, 4) or (m, 10) node indices
     regions: np.ndarray  # (m,) integer labels
     region_names: Mapping[str, int]  # labels by name
-
-    @property
-    def is_quadratic(self) -> bool:
-        """Whether elements have 10 nodes."""
-        return self.tets.shape[1] == 10
 
 
 def read_volume(path: Path, unit: str | None) -> Volume:
@@ -232,7 +227,8 @@ def write_volume(mesh: Volume, path: Path, unit: str) -> None:
     if path.suffix not in WRITERS:
         raise MeshError(f"{path}: unknown volume format '{path.suffix}'; known are {', '.join(WRITERS)}")
     require_writable(path, MeshError)
-    if mesh.is_quadratic and path.suffix in LINEAR_ONLY:
+    is_quadratic = mesh.tets.shape[1] == 10
+    if is_quadratic and path.suffix in LINEAR_ONLY:
         known = ", ".join(ending for ending in WRITERS if ending not in LINEAR_ONLY)
         raise MeshError(f"{path}: 10-node tetrahedra cannot be written to {path.suffix} files; use {known}")
     name = {".msh": "gmsh:physical", ".mesh": "medit:ref"}.get(path.suffix, "region")
@@ -243,25 +239,21 @@ def write_volume(mesh: Volume, path: Path, unit: str) -> None:
         data = {}
     points = mesh.nodes / length_scale(unit)
     names = {name: np.array([number, 3]) for name, number in mesh.region_names.items()} if path.suffix == ".msh" else {}
-    cells = [("tetra10" if mesh.is_quadratic else "tetra", mesh.tets)]
+    cells = [("tetra10" if is_quadratic else "tetra", mesh.tets)]
     content = meshio.Mesh(points, cells, cell_data=data, field_data=names)
-    if path.suffix == ".vol":
-        _replace(path, lambda partial: _write_netgen(partial, points, mesh))
-        return
     options = {"binary": True} if path.suffix == ".msh" else {}
     noise = io.StringIO()
     with contextlib.redirect_stdout(noise), contextlib.redirect_stderr(noise):
         if WRITERS[path.suffix] == "tetgen":
             _write_tetgen(content, path)
-        elif path.suffix == ".inp":
-            _replace(path, lambda partial: _write_abaqus(partial, content))
-        else:
-            _replace(path, lambda partial: meshio.write(partial, content, WRITERS[path.suffix], **options))
-
-
-def _replace(path: Path, write: Callable[[Path], None]) -> None:
-    with written_beside(path) as partial:
-        write(partial)
+            return
+        with written_beside(path) as partial:
+            if path.suffix == ".vol":
+                _write_netgen(partial, points, mesh)
+            elif path.suffix == ".inp":
+                _write_abaqus(partial, content)
+            else:
+                meshio.write(partial, content, WRITERS[path.suffix], **options)
 
 
 def _write_tetgen(content: meshio.Mesh, path: Path) -> None:

@@ -44,7 +44,7 @@ def _summary(labels: LabelMap, segments: Sequence[str | int] | None) -> dict[str
         "voxel_volume": labels.voxel_volume,
         "names": np.array([s.name for s in labels.segments], dtype=str),
         "values": [s.value for s in labels.segments],
-        "voxels": [int(np.count_nonzero(labels.mask(s))) for s in labels.segments],
+        "voxels": [labels.count(s) for s in labels.segments],
     }
 
 

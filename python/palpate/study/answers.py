@@ -211,13 +211,10 @@ def _operator(scene: StudyScene) -> GreensFunction:
 
 def _of_reference_modulus(scene: StudyScene) -> StudyScene:
     body = scene.bodies[0]
-    if body.material is None:
-        return scene.model_copy(update={"material": _with_reference(scene.material)})
-    return scene.model_copy(update={"bodies": [body.model_copy(update={"material": _with_reference(body.material)})]})
-
-
-def _with_reference(material: MaterialTable) -> MaterialTable:
-    return material.model_copy(update={"youngs_modulus": REFERENCE_MODULUS})
+    material = {"material": _material(scene).model_copy(update={"youngs_modulus": REFERENCE_MODULUS})}
+    return scene.model_copy(
+        update=material if body.material is None else {"bodies": [body.model_copy(update=material)]}
+    )
 
 
 def _touched_nodes(body: Body, presses: Sequence[PressTable]) -> np.ndarray:
