@@ -42,7 +42,7 @@ def description(body: Body) -> dict[str, Any]:
 
 
 def surface_moduli(body: Body) -> tuple[np.ndarray, np.ndarray]:
-    """Young's modulus (s,), Pa, and Poisson's ratio (s,) at the surface nodes.
+    """Young's modulus (s,), Pa, and Poisson's ratio (s,) at the surface nodes, for contacts smaller than elements.
 
     Of the modulus it is the harmonic mean of the elements around: beside a stiffer part the softer one yields.
     """

@@ -7,8 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 import scipy
 
-from palpate.body.predicate import AXES, parse
-from palpate.body.selection import node_indices
+from palpate.body.selection import AXES, node_indices, parse
 from palpate.errors import BodyError
 
 Fixed = str | Sequence[int] | np.ndarray | Mapping[str, Sequence[int]] | Callable[[np.ndarray], np.ndarray] | None

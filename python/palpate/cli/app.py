@@ -14,7 +14,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from palpate.cli.bodies import Element, FillingOptions, Unit, in_unit
+from palpate.cli.bodies import FillingOptions, Unit, in_unit
 from palpate.cli.checks import read_option, require_store
 from palpate.cli.option_groups import grouped
 from palpate.errors import BodyError, Error, MeshError, MeshWarning, StoreWarning, system_text
@@ -22,6 +22,7 @@ from palpate.fields import STRAIN_LIMIT
 from palpate.green import GreensFunction, error_text
 from palpate.input_file import require_writable
 from palpate.mesh import TetMesh, size_text
+from palpate.mesh.fill_job import Element
 from palpate.mesh.tetrahedralize import tetrahedralize_with
 from palpate.progress import status_line
 from palpate.scene import BuiltScene, Scene

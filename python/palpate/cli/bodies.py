@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import typer
@@ -19,7 +19,7 @@ from palpate.cluster import connected, dashboard, threads_of_workers
 from palpate.errors import BodyError, MeshError, UnclearUnitError, UnitError
 from palpate.mesh import TetMesh
 from palpate.mesh.files import read_volume
-from palpate.mesh.fill_job import FillOptions
+from palpate.mesh.fill_job import Element, FillOptions, Mesher
 from palpate.mesh.size import units_of_size
 from palpate.mesh.surface_file import SURFACE_ENDINGS
 from palpate.mesh.tetrahedralize import read_surface, tetrahedralize_with
@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from distributed import Client
 
 
-Mesher = Literal["netgen", "wrap"]
-Element = Literal["linear", "quadratic"]
 Unit = Annotated[
     str | None,
     typer.Option(

@@ -37,8 +37,7 @@ FORCE = 0.5
 @app.command()
 def devices(
     kind: Annotated[
-        str | None,
-        typer.Argument(help="Only this kind: haply, touch or forcedimension.", autocompletion=device_names),
+        str | None, typer.Argument(help="Only this kind: haply, touch or forcedimension.", autocompletion=device_names)
     ] = None,
     test: Annotated[
         bool, typer.Option("--test", help="Check one: rate, noise, range, buttons, then small forces.")

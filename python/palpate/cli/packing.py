@@ -33,8 +33,7 @@ def pack(
 @app.command()
 def web(
     scenes: Annotated[
-        list[str],
-        typer.Argument(help="Scene files (.toml), stores, or built-in models.", metavar="SCENE..."),
+        list[str], typer.Argument(help="Scene files (.toml), stores, or built-in models.", metavar="SCENE...")
     ],
     out: Annotated[Path, typer.Argument(help="Folder to write; an earlier site there is replaced.")],
     precision: Annotated[

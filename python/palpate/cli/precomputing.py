@@ -60,8 +60,7 @@ def precompute_command(
         str | None, typer.Option(help="Touchable surface: 'z > 3cm', or a region of the mesh file; default: all.")
     ] = None,
     first: Annotated[
-        str | None,
-        typer.Option(help="Part to compute first; the store is written as soon as this part is ready."),
+        str | None, typer.Option(help="Part to compute first; the store is written as soon as this part is ready.")
     ] = None,
     element: ElementChoice = None,
     *,

@@ -64,8 +64,7 @@ class RunOptions(FillingOptions, BodyOptions):
         str | None, typer.Option(help="Processors that the loop's thread keeps to, such as 1 or 2,3; default: any.")
     ] = None
     priority: Annotated[
-        int | None,
-        typer.Option(help="Real-time priority of the loop's thread, 1 to 99; 0 asks for none; default: 80."),
+        int | None, typer.Option(help="Real-time priority of the loop's thread, 1 to 99; 0 asks for none; default: 80.")
     ] = None
 
     def refuse(self, file: Path, allowed: set[str], reason: str, of_loop: bool = True) -> None:

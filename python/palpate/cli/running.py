@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import shlex
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 import typer
@@ -18,7 +19,6 @@ from palpate.cli.app import INTERRUPTED, app, prepared, print_note
 from palpate.cli.checks import finite, require_body, require_places
 from palpate.cli.completion import models
 from palpate.cli.impulse import SECONDS, impulse_history, impulse_scene
-from palpate.cli.linking import LinkOptions, linked
 from palpate.cli.option_groups import grouped
 from palpate.cli.run_file import RunOptions, built_from, surface_of
 from palpate.cli.scripted import PressRecord, scripted_press
@@ -31,6 +31,9 @@ from palpate.progress import Reporter, progress_reporter, reported_to
 from palpate.scene import BuiltScene, Scene, model_scene
 from palpate.validation.plots import plot_log, write_log
 from palpate.viewer.surface_map import read_map
+
+if TYPE_CHECKING:
+    from palpate.viewer.server import ViewerServer
 
 Headless = Annotated[
     float | None,
@@ -64,6 +67,33 @@ class Recorded:
     recordings: Annotated[
         Path, typer.Option(help="Folder for recordings and scenes of the page; default: this one.")
     ] = Path()
+
+
+@dataclass(frozen=True)
+class LinkOptions:
+    """What was asked for of OpenIGTLink."""
+
+    igtl: Annotated[
+        int | None,
+        typer.Option(
+            min=0, max=65535, help="Port of OpenIGTLink, such as 18944, for 3D Slicer and trackers; default: closed."
+        ),
+    ] = None
+    igtl_host: Annotated[
+        str, typer.Option(help="Address of OpenIGTLink; others than 127.0.0.1 let other machines move the tool.")
+    ] = "127.0.0.1"
+    igtl_axes: Annotated[
+        Literal["RAS", "LPS"], typer.Option(help="Axes of OpenIGTLink's messages, in millimetres.")
+    ] = "RAS"
+    igtl_from: Annotated[
+        str | None,
+        typer.Option(help="HOST:PORT of an OpenIGTLink server that sends poses, such as PLUS, to be called."),
+    ] = None
+
+    @property
+    def is_asked(self) -> bool:
+        """Whether anything is to be served or called."""
+        return self.igtl is not None or self.igtl_from is not None
 
 
 @app.command()
@@ -289,3 +319,26 @@ def _scripted(built: BuiltScene, name: str, seconds: float, out: Path, recording
     if statistics["fault"] is not None:
         print(f"palpate: {statistics['fault']}", file=sys.stderr)
         raise typer.Exit(1)
+
+
+@contextlib.contextmanager
+def linked(server: ViewerServer, options: LinkOptions, folder: Path) -> Iterator[None]:
+    """Serve OpenIGTLink for the scene that a page's server runs; ViewerError for a port in use."""
+    if not options.is_asked:
+        yield
+        return
+    from palpate.openigtlink import Axes, Link, LinkServer
+
+    link = Link(lambda: getattr(server.session, "simulation", None), Axes(options.igtl_axes), folder)
+    tracker = None if options.igtl_from is None else _address(options.igtl_from)
+    with LinkServer(link, options.igtl, host=options.igtl_host, tracker=tracker) as served:
+        if served.port is not None:
+            print(f"OpenIGTLink is at {options.igtl_host}:{served.port}, in mm and {options.igtl_axes}", flush=True)
+        yield
+
+
+def _address(text: str) -> tuple[str, int]:
+    host, colon, port = text.rpartition(":")
+    if not (colon and host and port.isascii() and port.isdigit() and 0 < int(port) < 65536):
+        raise typer.BadParameter(f"--igtl-from takes HOST:PORT, got '{text}'")
+    return host, int(port)

@@ -34,8 +34,7 @@ SHOWN = 10
 def export(
     file: Annotated[Path, typer.Argument(help="A recording (.mcap).")],
     to: Annotated[
-        str | None,
-        typer.Option(help="csv, parquet, pvd, glb or mp4; default: as --out.", autocompletion=formats),
+        str | None, typer.Option(help="csv, parquet, pvd, glb or mp4; default: as --out.", autocompletion=formats)
     ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="File to write; default: beside the recording.")

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from palpate.exam.course import Course, psychometrics_of
+from palpate.exam.course import Course
 from palpate.exam.library import Library
 from palpate.exam.psychometric import Estimate
 
@@ -28,5 +28,4 @@ def simulated_exam(library: Library, weber_fraction: float, seed: int) -> Course
 
 def simulated_exams(library: Library, weber_fraction: float, exams: int, seed: int = 0) -> list[Estimate]:
     """Estimates of so many exams by an observer, with seeds that follow each other."""
-    prepared = psychometrics_of(library)
-    return [simulated_exam(library, weber_fraction, seed + rank).estimate(prepared) for rank in range(exams)]
+    return [simulated_exam(library, weber_fraction, seed + rank).estimate() for rank in range(exams)]

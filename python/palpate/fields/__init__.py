@@ -1,16 +1,8 @@
 """Displacement, strain and stress of a body from the displacements of its surface."""
 
-from palpate.fields.export import Exportable, placed, together, write_result
-from palpate.fields.picture import DeformedSurface
+from palpate.fields.export import DeformedSurface, Exportable, placed, together, write_result
 from palpate.fields.result import Result, ResultSource
-from palpate.fields.strain_measure import (
-    LINEAR_STRAIN_LIMIT,
-    STRAIN_LIMIT,
-    StrainMeasure,
-    StrainReporting,
-    StrainSource,
-    SurfaceStrain,
-)
+from palpate.fields.strain_measure import LINEAR_STRAIN_LIMIT, STRAIN_LIMIT, StrainMeasure, SurfaceStrain
 from palpate.fields.stress import (
     ElementStrain,
     Interior,
@@ -30,8 +22,6 @@ __all__ = [
     "Result",
     "ResultSource",
     "StrainMeasure",
-    "StrainReporting",
-    "StrainSource",
     "StressRecovery",
     "SurfaceStrain",
     "SurfaceStress",

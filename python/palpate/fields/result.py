@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from palpate.fields.export import Exportable, surface_mesh, volume_mesh
-from palpate.fields.picture import DeformedSurface
+from palpate.fields.export import DeformedSurface, Exportable, surface_mesh, volume_mesh
 from palpate.fields.strain_measure import StrainReporting, StrainSource, SurfaceStrain
 from palpate.fields.stress import StressRecovery
 

@@ -155,15 +155,20 @@ class StressRecovery:
             Displacements that are not finite or of another shape.
 
         """
-        given, shape = number_array(everywhere, "displacements", BodyError), (self._gradient.shape[1] // 3, 3)
-        if given.shape != shape or not np.isfinite(given).all():
-            raise BodyError(f"displacements must be finite and of shape {shape}, got {given.shape}")
+        given = _checked(everywhere, self._gradient.shape[1] // 3)
         gradient = self._fit @ (self._gradient @ given.ravel()).reshape(-1, 9)
         strain = gradient @ STRAIN_OF_GRADIENT.T
         lam, mu = self._lame
         stress = 2 * mu[:, None] * strain
         stress[:, :3] += (lam * strain[:, :3].sum(axis=1))[:, None]
         return SurfaceStress(stress[:, TENSOR], strain[:, TENSOR], gradient.reshape(-1, 3, 3))
+
+
+def _checked(displacements: np.ndarray, count: int) -> np.ndarray:
+    given = number_array(displacements, "displacements", BodyError)
+    if given.shape != (count, 3) or not np.isfinite(given).all():
+        raise BodyError(f"displacements must be finite and of shape ({count}, 3), got {given.shape}")
+    return given
 
 
 def _gradient_operator(gradients: np.ndarray, tets: np.ndarray, node_count: int) -> scipy.sparse.csr_array:
@@ -265,7 +270,4 @@ class Interior:
 
     def extend(self, displacements: np.ndarray) -> np.ndarray:
         """Displacements of all nodes, (n, 3) m, from (s, 3) m at the surface nodes."""
-        given = number_array(displacements, "displacements", BodyError)
-        if given.shape != (self._surface, 3) or not np.isfinite(given).all():
-            raise BodyError(f"displacements must be finite and of shape ({self._surface}, 3), got {given.shape}")
-        return self.core.extend(given.ravel()).reshape(-1, 3)
+        return self.core.extend(_checked(displacements, self._surface).ravel()).reshape(-1, 3)

@@ -235,7 +235,7 @@ def _quantity(name: str, value: float) -> str:
 
 
 def write_fitted(text: str, changes: Sequence[tuple[Slot, dict[str, float]]], path: Path) -> None:
-    """Write the text of a scene with other values of its materials, beside and renamed."""
+    """Write the text of a scene with other values of its materials, beside and renamed; comments and order stay."""
     import tomlkit
 
     document = tomlkit.parse(text)

@@ -14,8 +14,7 @@ import numpy as np
 
 from palpate.errors import MeshError
 from palpate.input_file import quiet, reason_text, require_file
-from palpate.mesh.ply import has_strips, read_ply
-from palpate.mesh.stl import load_stl, read_stl
+from palpate.mesh.own_readers import has_strips, load_stl, read_ply, read_stl
 
 if TYPE_CHECKING:
     import trimesh
@@ -125,6 +124,7 @@ def _of_scene(path: Path, loaded: trimesh.Trimesh | trimesh.Scene) -> SurfaceFil
 def require_whole(path: Path, triangles: int) -> None:
     """Raise MeshError for a file with fewer faces than its header counts, or an STL text without its end.
 
+    An interrupted copy or a full disk leaves such files.
     Polygons are cut into triangles, so that a whole file has at least as many ``triangles``, which were read, as faces.
     Binary files are refused by their readers.
     """

@@ -147,14 +147,8 @@ def _parts(grid: Grid, field: SolidField, labels: np.ndarray) -> tuple[np.ndarra
     for rank, box in enumerate(ndimage.find_objects(number[found]), 1):
         low, high = (grid.origin + grid.cell * np.array([getattr(s, end) for s in box]) for end in ("start", "stop"))
         names = np.bincount(labels[(of_face == rank) & (labels >= 0)])
-        parts.append(
-            Part(
-                volumes[order[rank - 1]],
-                0.5 * (low + high - grid.cell),
-                high - low,
-                int(names.argmax()) if names.size else -1,
-            )
-        )
+        own = int(names.argmax()) if names.size else -1
+        parts.append(Part(volumes[order[rank - 1]], 0.5 * (low + high - grid.cell), high - low, own))
     return number[found], parts, float(volumes.sum() - volumes[order].sum())
 
 
@@ -175,11 +169,7 @@ def _around(
     own = kept[tuple(nearest)][coarse].reshape(fine.values.shape)
     found, _ = ndimage.label((fine.values < 0) & own)
     numbers = np.bincount(found.ravel())[1:]
-    return (
-        (fine, found > 0)
-        if numbers.size == 0
-        else (fine, np.isin(found, np.flatnonzero(numbers > CRUMB * numbers.max()) + 1))
-    )
+    return fine, np.isin(found, np.flatnonzero(numbers > CRUMB * numbers.max(initial=0)) + 1)
 
 
 def _only(grid: Grid, kept: np.ndarray) -> Grid:
@@ -209,12 +199,7 @@ def _zero(grid: Grid, moved: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _beside_and_lost(
-    field: SolidField,
-    vertices: np.ndarray,
-    faces: np.ndarray,
-    grid: Grid,
-    label: np.ndarray | None,
-    kept: np.ndarray,
+    field: SolidField, vertices: np.ndarray, faces: np.ndarray, grid: Grid, label: np.ndarray | None, kept: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Points of the surface between inside and outside that the wrap is near, and those that it is not."""
     points = field.boundary_samples(SAMPLES, 0.05 * grid.cell)

@@ -207,7 +207,7 @@ class _Wrapped:
         self.parts = [
             (float(volume) * extent**3, self.to_metres(middle), sides * extent, int(label))
             for volume, middle, sides, label in zip(
-                *(arrays[f"part_{name}"] for name in ("volumes", "middles", "sides", "labels")), strict=True
+                *(arrays[f"part_{name}"] for name in ("volume", "middle", "sides", "label")), strict=True
             )
         ]
         used = np.unique(arrays["target"])

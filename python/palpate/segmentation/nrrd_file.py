@@ -12,7 +12,9 @@ import zlib
 from pathlib import Path
 from typing import Any, BinaryIO
 
+import nrrd
 import numpy as np
+from nrrd.reader import _TYPEMAP_NRRD2NUMPY as NAMES
 
 from palpate.errors import MeshError
 from palpate.input_file import reason_text
@@ -56,8 +58,6 @@ def read_nrrd(path: Path) -> RawImage:
 
 def _header(path: Path, file: BinaryIO) -> dict[str, Any]:
     """Parse the lines up to the first empty one, where the file then stands."""
-    import nrrd
-
     lines: list[str] = []
     size = 0
     while size < MOST_HEADER:
@@ -97,8 +97,6 @@ def _sizes(path: Path, header: dict[str, Any]) -> tuple[tuple[int, ...], bool]:
 
 
 def _dtype(path: Path, header: dict[str, Any]) -> np.dtype:
-    from nrrd.reader import _TYPEMAP_NRRD2NUMPY as NAMES
-
     name = NAMES.get(header["type"])
     if name is None or name.startswith("V"):
         raise MeshError(f"{path}: voxels of type '{header['type']}' are not read; labels are whole numbers")

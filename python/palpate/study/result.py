@@ -22,13 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 # Units of what may be varied, as they stand behind the name of a column.
-UNITS = {
-    "youngs_modulus": "Pa",
-    "density": "kg_per_m3",
-    "max_element_size": "m",
-    "radius": "m",
-    "pressure": "Pa",
-}
+UNITS = {"youngs_modulus": "Pa", "density": "kg_per_m3", "max_element_size": "m", "radius": "m", "pressure": "Pa"}
 # A range this wide is drawn on a logarithmic axis.
 WIDE = 5.0
 # Beyond so many texts along an axis they are turned.
