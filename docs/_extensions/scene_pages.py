@@ -18,7 +18,7 @@ from tables import code, table
 from palpate.exam import file as exam
 from palpate.scene import devices, dynamics, loads, regions, tables, touch
 from palpate.scene import table as types
-from palpate.study import tables as study
+from palpate.study import cases as study
 
 HEAD = """# Keys of a scene file
 

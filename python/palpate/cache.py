@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import json
 import os
 import re
@@ -18,6 +19,11 @@ from palpate.leftovers import is_leftover
 _WRITTEN = re.compile(r"\.\d+\.(new|partial)$")
 # Longest header of a store that is read to say what it is, bytes.
 HEADER_BYTES = 10_000_000
+
+
+def digest(value: Any) -> str:
+    """Checksum of what JSON can hold, whatever the order of its keys."""
+    return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()
 
 
 def cache_directory() -> Path:

@@ -1,10 +1,16 @@
-"""The one check of a file that is to be read, and the one reader of TOML."""
+"""Checks of files that are read or written, the one reader of TOML, and quiet for libraries that read files."""
 
 from __future__ import annotations
 
+import contextlib
+import logging
 import sys
+import warnings
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from palpate.atomic import destination
 from palpate.errors import Error
@@ -64,3 +70,22 @@ def _with_other_ending(path: Path) -> Path | None:
         return None
     others = [other for other in path.parent.iterdir() if other.stem.lower() == path.stem.lower() and other.is_file()]
     return others[0] if len(others) == 1 else None
+
+
+def reason_text(error: Exception) -> str:
+    """Why a library could not read a file, in one short line."""
+    return " ".join(str(error).split())[:150] or type(error).__name__
+
+
+@contextlib.contextmanager
+def quiet(library: str) -> Iterator[None]:
+    """Keep a library's warnings, and its log of what it got over or mended, from the terminal."""
+    log = logging.getLogger(library)
+    level = log.level
+    log.setLevel(logging.CRITICAL + 1)
+    try:
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        log.setLevel(level)

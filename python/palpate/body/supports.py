@@ -7,11 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 import scipy
 
-from palpate.body.predicate import parse
-from palpate.body.selection import node_indices
+from palpate.body.selection import AXES, node_indices, parse
 from palpate.errors import BodyError
-
-AXES = {"x": 0, "y": 1, "z": 2}
 
 Fixed = str | Sequence[int] | np.ndarray | Mapping[str, Sequence[int]] | Callable[[np.ndarray], np.ndarray] | None
 
@@ -48,13 +45,8 @@ def _named_mask(nodes: np.ndarray, fixed: Fixed) -> np.ndarray:
             mask[node_indices(nodes_of_axis, count, "fixed"), AXES[name]] = True
         return mask
     array = np.asarray(fixed)
-    if array.dtype == bool:
-        if array.shape == (count, 3):
-            return array.copy()
-        if array.shape == (count,):
-            mask[array] = True
-            return mask
-        raise BodyError(f"a mask for fixed must have length {count}, got shape {array.shape}")
+    if array.dtype == bool and array.shape == (count, 3):
+        return array.copy()
     mask[node_indices(array, count, "fixed")] = True
     return mask
 

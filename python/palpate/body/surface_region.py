@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from palpate.body.body import Body
-from palpate.body.predicate import parse
+from palpate.body.selection import parse
 from palpate.errors import BodyError
 from palpate.units import brief_repr
 

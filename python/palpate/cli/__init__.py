@@ -2,19 +2,18 @@
 
 from palpate.cli import (  # noqa: F401  they register their commands
     caching,
+    catalogue,
+    describing,
     devices,
-    doctor,
     examining,
     fitting,
     mapping,
     packing,
     precomputing,
-    recordings,
     running,
     sessions,
     studying,
-    verification,
-    web,
+    validating,
 )
 from palpate.cli.app import main
 

@@ -1,36 +1,34 @@
-"""The commands. Heavy imports are inside the functions, so that ``palpate --help`` is quick."""
+"""The commands. What ``import palpate`` does not load is imported in the functions: ``palpate --help`` is quick."""
 
 from __future__ import annotations
 
+import contextlib
 import signal
 import sys
 import warnings
+from collections.abc import Iterator
+from importlib.metadata import version as version_of
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
+import numpy as np
 import typer
 
-from palpate.cli.bodies import (
-    Element,
-    MaxSize,
-    MaxVolumeLoss,
-    MesherChoice,
-    Part,
-    Segments,
-    Unit,
-    fill_options,
-    in_unit,
-    is_surface,
-)
-from palpate.cli.completion import units
-from palpate.cli.option_values import read_option, require_unit
-from palpate.cli.scene_lines import print_scene
-from palpate.cli.store_lines import green_line, precision_line
-from palpate.segmentation.endings import is_segmentation
+from palpate.cli.bodies import FillingOptions, Unit, in_unit
+from palpate.cli.checks import read_option, require_store
+from palpate.cli.option_groups import grouped
+from palpate.errors import BodyError, Error, MeshError, MeshWarning, StoreWarning, system_text
+from palpate.fields import STRAIN_LIMIT
+from palpate.green import GreensFunction, error_text
+from palpate.input_file import require_writable
+from palpate.mesh import TetMesh, size_text
+from palpate.mesh.fill_job import Element
+from palpate.mesh.tetrahedralize import tetrahedralize_with
+from palpate.progress import status_line
+from palpate.scene import BuiltScene, Scene
+from palpate.scene.default_radius import default_contact_radius
 from palpate.startup import restore_interrupts
-
-if TYPE_CHECKING:
-    from palpate.mesh import TetMesh
+from palpate.units import length
 
 # Exit code of Ctrl-C, as shells have it.
 INTERRUPTED = 130
@@ -40,9 +38,7 @@ app = typer.Typer(help="Finite elements you can feel.", pretty_exceptions_enable
 
 def _show_version(wanted: bool) -> None:
     if wanted:
-        from importlib.metadata import version
-
-        print(f"palpate {version('palpate')}")
+        print(f"palpate {version_of('palpate')}")
         raise typer.Exit
 
 
@@ -69,11 +65,9 @@ def main() -> None:
 
 def run_commands(commands: typer.Typer) -> None:
     """Run commands; a user's mistake is one line and exit code 2, Ctrl-C is 130, SIGTERM 143."""
-    from palpate.errors import Error, MeshWarning, StoreWarning, system_text
 
     def show(message: Warning | str, category: type[Warning], *_args: object, **_kwargs: object) -> None:
-        label = "note" if issubclass(category, (MeshWarning, StoreWarning)) else "warning"
-        print(f"palpate: {label}: {message}", file=sys.stderr)
+        print_note(message, "note" if issubclass(category, (MeshWarning, StoreWarning)) else "warning")
 
     warnings.showwarning = show
     try:
@@ -99,22 +93,46 @@ def _terminate(*_signal: object) -> None:
 
 
 def _print_error(message: str) -> int:
-    print(f"palpate: error: {message}", file=sys.stderr)
+    print_note(message, "error")
     return 2
 
 
+def print_note(message: Warning | str, label: str = "note") -> None:
+    """Print a line beside the results of a command."""
+    print(f"palpate: {label}: {message}", file=sys.stderr)
+
+
+def millimetres(place: np.ndarray) -> str:
+    """Write a place (3,), m, to a tenth of a millimetre."""
+    return f"({', '.join(f'{1e3 * x:.1f}' for x in place)}) mm"
+
+
+@contextlib.contextmanager
+def keeping(what: str, folder: Path) -> Iterator[None]:
+    """Name what Ctrl-C leaves in a folder, from where the same command continues."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        print(f"palpate: finished {what} are kept in {folder}, and the same command continues", file=sys.stderr)
+        raise typer.Exit(INTERRUPTED) from None
+
+
+def prepared(scene: Scene) -> BuiltScene:
+    """Build a scene, with a line on the terminal meanwhile."""
+    with status_line(f"preparing {scene.name}"):
+        return scene.build()
+
+
 @app.command()
+@grouped
 def mesh(
     surface: Annotated[
         Path, typer.Argument(help="Surface (STL, OBJ, PLY, OFF, GLB, glTF) or segmentation (NRRD, NIfTI).")
     ],
     out: Annotated[Path, typer.Argument(help="Volume mesh: .vtu, .msh, .vtk, .inp, .mesh, .vol or .node.")],
     unit: Unit = None,
-    max_size: MaxSize = None,
-    mesher: MesherChoice = None,
-    part: Part = None,
-    max_volume_loss: MaxVolumeLoss = None,
-    segment: Segments = None,
+    *,
+    filling: FillingOptions,
     quadratic: Annotated[
         bool, typer.Option("--quadratic", help="10-node tetrahedra; make them twice as large.")
     ] = False,
@@ -127,20 +145,12 @@ def mesh(
 
     Example: palpate mesh scan.ply scan.vtu --unit mm --part all
     """
-    from palpate.errors import MeshError
-    from palpate.input_file import require_writable
-    from palpate.mesh.tetrahedralize import tetrahedralize_with
-    from palpate.units import length
-
     require_writable(out, MeshError)
-    size = None if max_size is None else read_option("--max-size", max_size, length)
+    size, fill = filling.size, filling.fill
     element: Element = "quadratic" if quadratic else "linear"
-    fill = fill_options(mesher, part, max_volume_loss, segment)
     volume_mesh = in_unit(unit, lambda unit: tetrahedralize_with(element, surface, size, unit, options=fill))
     volume_mesh.write(out)
-    print(
-        f"{out}: {_mesh_line(volume_mesh)}, smallest dihedral angle {volume_mesh.dihedral_angles().min():.0f} degrees"
-    )
+    print(f"{out}: {mesh_line(volume_mesh)}, smallest dihedral angle {volume_mesh.dihedral_angles().min():.0f} degrees")
 
 
 @app.command()
@@ -156,16 +166,6 @@ def touch(
 
     Example: palpate touch liver.palpate --point 0,4cm,2cm --press=-,-3mm,- --radius 5mm
     """
-    import numpy as np
-
-    from palpate.cli.checks import require_store
-    from palpate.errors import BodyError
-    from palpate.fields import STRAIN_LIMIT
-    from palpate.green import GreensFunction, error_text
-    from palpate.mesh import size_text
-    from palpate.scene.default_radius import default_contact_radius
-    from palpate.units import length
-
     require_store(store)
     green = GreensFunction.load(store)
     where = [read_option("--point", v, length) for v in point.split(",")]
@@ -188,91 +188,10 @@ def touch(
         raise typer.Exit(1)
 
 
-@app.command()
-def info(
-    file: Annotated[Path, typer.Argument(help="A store, modes, a scene, a volume mesh, a surface or a segmentation.")],
-    unit: Annotated[
-        str | None,
-        typer.Option(
-            help="Unit of length; default: m, for a surface the unit that fits its size.", autocompletion=units
-        ),
-    ] = None,
-) -> None:
-    """Describe a file.
-
-    Example: palpate info liver.palpate
-    """
-    from palpate.cli.checks import require_body
-    from palpate.dynamics import ModalBasis
-    from palpate.green import GreensFunction
-    from palpate.green.series import lines_of_series, series_line
-    from palpate.mesh import TetMesh
-
-    require_body(file)
-    require_unit(unit)
-    if file.name.endswith(".modes.palpate"):
-        basis = ModalBasis.load(file)
-        print(f"{file}: {len(basis)} modes, {basis.frequencies[0]:.4g} to {basis.frequencies[-1]:.4g} Hz")
-        _print_origin(basis.description, basis.key)
-        return
-    if file.name.endswith(".series.palpate"):
-        print(f"{file}: {series_line(file)}")
-        return
-    if file.suffix == ".palpate":
-        green = GreensFunction.load(file)
-        print(f"{file}: {green_line(green)}")
-        print(f"  {precision_line(green)}")
-        _print_origin(green.description, green.key)
-        for line in lines_of_series(file):
-            print(f"  {line}")
-        return
-    if file.suffix == ".toml":
-        print_scene(file)
-        return
-    if is_segmentation(file):
-        from palpate.cli.segmentations import print_segmentation
-
-        print_segmentation(file, unit)
-        return
-    if is_surface(file):
-        from palpate.cli.surfaces import print_surface
-
-        print_surface(file, unit)
-        return
-    # A size that needs asking about is what this command tells.
-    tets = TetMesh.read(file, unit or "m")
-    print(f"{file}: {_mesh_line(tets)}")
-    low, high = 1e3 * tets.bounds
-    print(f"  bounds: {low.round(2).tolist()} to {high.round(2).tolist()} mm, volume {1e6 * tets.volume:.4g} cm3")
-    print(
-        f"  regions: {sorted(set(tets.regions.tolist()))}, dihedral angle >= {tets.dihedral_angles().min():.1f} degrees"
-    )
-
-
-@app.command("models")
-def models_command() -> None:
-    """List the built-in models, beside the paper's own counts.
-
-    Example: palpate models
-    """
-    from palpate.cli.catalogue import print_models
-
-    print_models()
-
-
-def _mesh_line(mesh: TetMesh) -> str:
-    from palpate.mesh import size_text
-
+def mesh_line(mesh: TetMesh) -> str:
+    """Size of a mesh, and its counts."""
     return (
         f"{size_text(mesh.bounds[1] - mesh.bounds[0])}, {len(mesh.nodes)} nodes, {len(mesh.tets)} "
         f"{'10-node ' if mesh.is_quadratic else ''}tetrahedra, {len(mesh.surface_nodes)} surface nodes, "
         f"{len(mesh.surface_triangles)} triangles"
     )
-
-
-def _print_origin(description: dict[str, object], key: str) -> None:
-    """Say what a precomputed file was made from."""
-    # Constants at every surface node are for programs.
-    for name, value in ((name, value) for name, value in description.items() if name != "surface_moduli"):
-        print(f"  {name.replace('_', ' ')}: {value}")
-    print(f"  key: {key}")

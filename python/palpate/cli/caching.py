@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from datetime import datetime
 from typing import Annotated
 
 import typer
 
+from palpate.cache import cache_directory, cached_files, chosen_files
+from palpate.cache_limit import cache_limit, set_cache_limit
 from palpate.cli.app import app
 
 cache_app = typer.Typer(help="Precomputed files kept for you.", no_args_is_help=True)
@@ -13,8 +16,6 @@ app.add_typer(cache_app, name="cache")
 
 
 def _names(incomplete: str) -> list[str]:
-    from palpate.cache import cached_files
-
     return [file.name for file in cached_files() if file.name.startswith(incomplete)]
 
 
@@ -24,11 +25,6 @@ def cache_list() -> None:
 
     Example: palpate cache list
     """
-    from datetime import datetime
-
-    from palpate.cache import cache_directory, cached_files
-    from palpate.cache_limit import cache_limit
-
     files = cached_files()
     width = max((len(file.name) for file in files), default=0)
     for file in files:
@@ -53,9 +49,6 @@ def cache_limit_command(
 
     Example: palpate cache limit 20GB
     """
-    from palpate.cache import cached_files
-    from palpate.cache_limit import cache_limit, set_cache_limit
-
     if size is not None:
         set_cache_limit(None if size == "default" else size)
     used, limit = sum(file.size for file in cached_files()) / 1e9, cache_limit()
@@ -76,8 +69,6 @@ def cache_clear(
 
     Example: palpate cache clear 3f2a90
     """
-    from palpate.cache import cached_files, chosen_files
-
     files = cached_files() if name is None else chosen_files(name)
     files = [file for file in files if file.leftover or not leftovers]
     for file in files:

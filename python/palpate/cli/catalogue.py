@@ -1,13 +1,18 @@
-"""The built-in models as a table."""
+"""The command that lists the built-in models."""
 
 from __future__ import annotations
 
 from palpate import models
+from palpate.cli.app import app
 from palpate.mesh import TetMesh
 
 
-def print_models() -> None:
-    """Tables of the models: what the demo shows, and those in the paper's sizes beside its own counts."""
+@app.command("models")
+def models_command() -> None:
+    """List the built-in models, beside the paper's own counts.
+
+    Example: palpate models
+    """
     from rich.console import Console
     from rich.table import Table
 

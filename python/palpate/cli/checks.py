@@ -1,15 +1,25 @@
-"""Checks of files and folders that a command was given, before its work."""
+"""Checks of options, files and folders that a command was given, before its work; errors name the option."""
 
 from __future__ import annotations
 
+import math
 import shlex
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
-from palpate.errors import Error, SceneError, StoreError
+import typer
 
-if TYPE_CHECKING:
-    from palpate.scene import Scene
+from palpate.errors import Error, SceneError, StoreError, UnitError
+from palpate.input_file import require_file
+from palpate.mesh.files import WRITERS
+from palpate.mesh.surface_file import SURFACE_ENDINGS
+from palpate.models import NAMES
+from palpate.scene import Scene, model_scene
+from palpate.segmentation.endings import SEGMENTATION_ENDINGS, is_segmentation
+from palpate.simulation import require_new_recording
+from palpate.units import length_scale
+from palpate.viewer.addresses import require_free_port
 
 
 def require_folder(folder: Path, option: str = "--out") -> None:
@@ -28,15 +38,11 @@ def require_places(record: Path | None, out: Path | None, page: tuple[str, int] 
     if out is not None:
         require_folder(out)
     if page is not None:
-        from palpate.viewer.addresses import require_free_port
-
         require_free_port(*page)
 
 
 def require_recordable(file: Path) -> None:
     """Refuse a file in which a simulation would not record, or one whose ending no command would open again."""
-    from palpate.simulation import require_new_recording
-
     if file.suffix != ".mcap":
         raise SceneError(f"--record {file}: a recording ends in .mcap: name it {file.with_suffix('.mcap')}")
     require_new_recording(file)
@@ -50,8 +56,6 @@ def require_store_name(file: Path) -> None:
 
 def require_store(file: Path) -> None:
     """Refuse a file that is missing, or no store."""
-    from palpate.input_file import require_file
-
     require_file(file, StoreError)
     if file.suffix != ".palpate":
         raise StoreError(f"{file} is no store: 'palpate precompute {shlex.quote(str(file))}' makes one (.palpate)")
@@ -59,11 +63,6 @@ def require_store(file: Path) -> None:
 
 def require_body(file: Path) -> None:
     """Refuse a file that is missing, or of a kind that holds no body."""
-    from palpate.input_file import require_file
-    from palpate.mesh.files import WRITERS
-    from palpate.mesh.surface_file import SURFACE_ENDINGS
-    from palpate.segmentation.endings import SEGMENTATION_ENDINGS, is_segmentation
-
     require_file(file, SceneError)
     if file.suffix.lower() == ".mcap":
         raise SceneError(f"{file} is a recording: 'palpate replay' shows it, 'palpate export' and 'compare' read it")
@@ -80,9 +79,6 @@ def require_body(file: Path) -> None:
 
 def scene_of_file(file: Path) -> Scene:
     """Scene of a file or a store; SceneError for other files."""
-    from palpate.input_file import require_file
-    from palpate.scene import Scene
-
     if file.suffix == ".palpate":
         return Scene.of_store(file)
     require_file(file, SceneError)
@@ -93,9 +89,6 @@ def scene_of_file(file: Path) -> Scene:
 
 def scene_of_name(name: str) -> Scene:
     """Scene of a file, a store, or a built-in model by its name; SceneError for anything else."""
-    from palpate.models import NAMES
-    from palpate.scene import model_scene
-
     file = Path(name)
     if file.exists() or file.suffix:
         return scene_of_file(file)
@@ -106,6 +99,25 @@ def scene_of_name(name: str) -> Scene:
 
 def no_such_model(name: str) -> SceneError:
     """Error for what is neither a file nor a model."""
-    from palpate.models import NAMES
-
     return SceneError(f"{name}: no such file, and no model of that name; models are {', '.join(NAMES)}")
+
+
+def read_option(option: str, text: str, read: Callable[[str], Any]) -> Any:
+    """Value of what was typed for an option; the UnitError of what cannot be read names the option."""
+    try:
+        return read(text)
+    except UnitError as error:
+        raise UnitError(f"{option}: {error}") from None
+
+
+def require_unit(unit: str | None) -> None:
+    """Refuse a unit that is no length, before the file is read."""
+    if unit is not None:
+        read_option("--unit", unit, length_scale)
+
+
+def finite(seconds: float | None) -> float | None:
+    """Refuse a time without an end."""
+    if seconds is not None and not math.isfinite(seconds):
+        raise typer.BadParameter(f"{seconds} is not a number of seconds")
+    return seconds

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from palpate.models import NAMES
+from palpate.scene.devices import KINDS
+from palpate.sessions import FORMATS
+from palpate.units import LENGTH_UNITS
+
 
 def units(incomplete: str) -> list[str]:
     """Units of length."""
-    from palpate.units import LENGTH_UNITS
-
     return _completions(LENGTH_UNITS, incomplete)
 
 
 def models(incomplete: str) -> list[str]:
     """Built-in models."""
-    from palpate.models import NAMES
-
     return _completions(NAMES, incomplete)
 
 
@@ -26,8 +27,6 @@ def precisions(incomplete: str) -> list[str]:
 
 def formats(incomplete: str) -> list[tuple[str, str]]:
     """List the formats that a recording is written in, and what they are."""
-    from palpate.sessions import FORMATS
-
     return [(ending[1:], what) for ending, what in FORMATS.items() if ending[1:].startswith(incomplete)]
 
 
@@ -40,8 +39,6 @@ def checks(incomplete: str) -> list[tuple[str, str]]:
 
 def devices(incomplete: str) -> list[str]:
     """Kinds of devices."""
-    from palpate.scene.devices import KINDS
-
     return _completions(KINDS, incomplete)
 
 

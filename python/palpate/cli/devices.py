@@ -7,15 +7,24 @@ import math
 import sys
 from collections.abc import Iterator
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from palpate.cli.app import app
 from palpate.cli.completion import devices as device_names
-
-if TYPE_CHECKING:
-    from palpate.devices import Checked, DeviceLimits, Listing, SelfCheck, UsbDevice, Watched
+from palpate.devices import (
+    DIRECTIONS,
+    Checked,
+    DeviceLimits,
+    Listing,
+    SelfCheck,
+    UsbDevice,
+    Watched,
+    listings,
+    usb_devices,
+)
+from palpate.errors import DeviceError
 
 SCHEMA = 1
 # How long a device is watched at rest and while it is moved, and how long a force rises, s.
@@ -28,8 +37,7 @@ FORCE = 0.5
 @app.command()
 def devices(
     kind: Annotated[
-        str | None,
-        typer.Argument(help="Only this kind: haply, touch or forcedimension.", autocompletion=device_names),
+        str | None, typer.Argument(help="Only this kind: haply, touch or forcedimension.", autocompletion=device_names)
     ] = None,
     test: Annotated[
         bool, typer.Option("--test", help="Check one: rate, noise, range, buttons, then small forces.")
@@ -48,8 +56,6 @@ def devices(
 
     Example: palpate devices touch --test
     """
-    from palpate.devices import listings, usb_devices
-
     found = listings(None if kind is None else [kind])
     if test:
         passed = _check(_choose_device(found, id), yes, as_json)
@@ -65,8 +71,6 @@ def devices(
 
 def _choose_device(found: list[Listing], id: str | None) -> tuple[str, str | None]:
     """Kind and identity of the device to be checked; DeviceError if there is none, or why it cannot be opened."""
-    from palpate.errors import DeviceError
-
     if id is not None:
         if len(found) == 1:
             return found[0].kind, id  # its driver reports what is wrong with it
@@ -89,9 +93,6 @@ def _choose_device(found: list[Listing], id: str | None) -> tuple[str, str | Non
 
 def _check(which: tuple[str, str | None], yes: bool, as_json: bool) -> bool:
     """Check a device, asking before forces; whether it passed."""
-    from palpate.devices import Checked, SelfCheck
-    from palpate.errors import DeviceError
-
     if not yes and not is_terminal():
         raise DeviceError("a check asks before any force: run it at a terminal, or give --yes")
     kind, id = which
@@ -122,8 +123,6 @@ def is_terminal() -> bool:
 
 def _pushes(check: SelfCheck) -> Iterator[Any]:
     """Push in each direction in turn; a fault is the last."""
-    from palpate.devices import DIRECTIONS
-
     force = min(FORCE, check.limits.max_force)
     for direction, (_, words) in DIRECTIONS.items():
         _print_line(f"  {direction}: pushes {words}")
@@ -188,8 +187,6 @@ def _limits_text(limits: DeviceLimits) -> str:
 
 
 def _result_lines(result: Checked) -> Iterator[str]:
-    from palpate.devices import DIRECTIONS
-
     rest, moved = result.rest, result.range
     yield f"{'readings':14s}{rest.rate:8.0f} a second, longest gap {1e3 * rest.longest_gap:.1f} ms{_verdict(rest)}"
     yield f"{'noise at rest':14s}" + _by_axis(rest.deviation, 1e6, "um")

@@ -5,10 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+import numpy as np
 import typer
 
 from palpate.cli.app import app
-from palpate.cli.running import PORT, Browser, Host, Port
+from palpate.cli.checks import require_places
+from palpate.cli.option_groups import grouped
+from palpate.cli.running import Page
+from palpate.errors import SceneError
+from palpate.progress import status_line
 
 if TYPE_CHECKING:
     from palpate.exam import Course, Library
@@ -23,6 +28,7 @@ def exam() -> None:
 
 
 @exam_app.command()
+@grouped
 def nodule(
     file: Annotated[
         Path | None, typer.Argument(help="Exam file (.toml); without it, a slab of soft tissue with four places.")
@@ -38,9 +44,8 @@ def nodule(
         typer.Option(min=0.005, max=1, help="A simulated observer with this Weber fraction answers, without a page."),
     ] = None,
     exams: Annotated[int, typer.Option(min=1, help="With --observer: number of exams.")] = 1,
-    port: Port = PORT,
-    host: Host = "127.0.0.1",
-    browser: Browser = True,
+    *,
+    page: Page,
 ) -> None:
     """Find hidden nodules by touch alone in the browser: a staircase gives the contrast that this hand detects.
 
@@ -53,11 +58,9 @@ def nodule(
 
     Example: palpate exam nodule --observer 0.1 --exams 200
     """
-    from palpate.cli.checks import require_places
     from palpate.exam import ExamFile, Library
-    from palpate.progress import status_line
 
-    require_places(None, out, (host, port) if observer is None else None)
+    require_places(None, out, page.address if observer is None else None)
     found = ExamFile.default() if file is None else ExamFile.read(file)
     chosen = found.question.seed if seed is None else seed
     with status_line(f"preparing {found.title}"):
@@ -67,12 +70,12 @@ def nodule(
         return
     out.mkdir(parents=True, exist_ok=True)
     if observer is None:
-        _ask(library, out, chosen, (host, port, browser))
+        _ask(library, out, chosen, page)
     else:
         _observe(library, observer, chosen or 0, out)
 
 
-def _ask(library: Library, out: Path, seed: int | None, where: tuple[str, int, bool]) -> None:
+def _ask(library: Library, out: Path, seed: int | None, page: Page) -> None:
     """Exam of a person, from where it was interrupted."""
     from palpate.exam import Record
     from palpate.exam.live import ExamServer, finish
@@ -85,8 +88,7 @@ def _ask(library: Library, out: Path, seed: int | None, where: tuple[str, int, b
         return
     if course.answers:
         print(f"continuing with trial {course.trial.number} of {course.count}")
-    host, port, browser = where
-    open_viewer(ExamServer(course, out, host=host, port=port), browser=browser)
+    open_viewer(ExamServer(course, out, host=page.host, port=page.port), browser=page.browser)
     if course.trial is not None:
         print(f"{len(course.answers)} of {course.count} trials answered; the same command continues")
     else:
@@ -95,7 +97,6 @@ def _ask(library: Library, out: Path, seed: int | None, where: tuple[str, int, b
 
 def _observe(library: Library, weber_fraction: float, seed: int, out: Path) -> None:
     """One exam of an observer, with all that an exam of a person leaves."""
-    from palpate.errors import SceneError
     from palpate.exam import Record, simulated_exam
     from palpate.exam.live import finish
 
@@ -112,8 +113,6 @@ def _observe(library: Library, weber_fraction: float, seed: int, out: Path) -> N
 
 def _print_spread(library: Library, weber_fraction: float, exams: int, seed: int) -> None:
     """Print what exams find of a known observer, over seeds."""
-    import numpy as np
-
     from palpate.exam import simulated_exams
 
     found = simulated_exams(library, weber_fraction, exams, seed)

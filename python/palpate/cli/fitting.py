@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from palpate.cli.app import app
+from palpate.cli.app import app, millimetres, print_note
+from palpate.errors import FitError
+from palpate.fitting import Indentations, fit
+from palpate.input_file import require_writable
+from palpate.progress import status_line
 
 
 @app.command("fit")
@@ -39,11 +42,6 @@ def fit_command(
 
     Example: palpate fit export.csv phantom.toml --force-unit mN --depth-unit um --find-touch
     """
-    from palpate.errors import FitError
-    from palpate.fitting import Indentations, fit
-    from palpate.input_file import require_writable
-    from palpate.progress import status_line
-
     columns = {"force_column": force_column, "depth_column": depth_column}
     data = Indentations.read(measured, force_unit=force_unit, depth_unit=depth_unit, **columns)
     result = out if out is not None else scene.with_name(f"{scene.stem}-fitted.toml")
@@ -58,7 +56,7 @@ def fit_command(
     solved = "1 body" if found.solved == 1 else f"{found.solved} bodies"
     print(f"{rows} rows of {curves} curve{'s' if curves > 1 else ''}; {solved} solved")
     for name, point in zip(found.measured.names, found.points, strict=True):
-        print(f"{name}: pressed at (" + ", ".join(f"{1e3 * x:.1f}" for x in point) + ") mm")
+        print(f"{name}: pressed at {millimetres(point)}")
     for parameter in found.parameters:
         print(parameter)
     if find_touch:
@@ -66,7 +64,7 @@ def fit_command(
             print(f"{name}: first touch at {1e3 * depth:.3g} mm")
     print(f"residuals: {100 * found.scatter:.2g} % of the largest force (root mean square)")
     for note in found.notes:
-        print(f"palpate: note: {note}", file=sys.stderr)
+        print_note(note)
     found.write_scene(result)
     found.picture(picture)
     print(f"wrote {result}, {picture}")

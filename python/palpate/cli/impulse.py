@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import asdict
 from pathlib import Path
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from palpate import models
 from palpate.body import Body, Material, free_end
+from palpate.cli.app import print_note
 from palpate.dynamics import Newmark, rayleigh_from_ratios
 from palpate.errors import SceneError
 from palpate.fields import LINEAR_STRAIN_LIMIT, SurfaceStrain
@@ -50,10 +50,7 @@ def impulse_history(model: str, paper: bool, seconds: float, out: Path) -> None:
     print(f"wrote {out / name}.csv and .png")
     strain = _largest_strain(body, surface)
     if strain > LINEAR_STRAIN_LIMIT:
-        print(
-            f"palpate: note: strains reach {100 * strain:.0f} % where the node is struck, beyond linear elasticity",
-            file=sys.stderr,
-        )
+        print_note(f"strains reach {100 * strain:.0f} % where the node is struck, beyond linear elasticity")
 
 
 def impulse_scene(model: str, paper: bool) -> Scene:

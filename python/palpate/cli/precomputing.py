@@ -3,40 +3,41 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from palpate import units
+from palpate.body import Loads, Material, surface_region
 from palpate.cli.app import app
 from palpate.cli.bodies import (
     Dask,
     ElementChoice,
-    MaxSize,
-    MaxVolumeLoss,
-    MesherChoice,
-    Part,
-    Segments,
+    FillingOptions,
     Unit,
     body_of,
     cluster,
-    fill_options,
     in_unit,
     materials_of,
     read_any,
 )
+from palpate.cli.checks import read_option, require_body, require_store_name
 from palpate.cli.completion import precisions
-from palpate.cli.option_values import read_option
-from palpate.cli.store_lines import green_line, precision_line
-
-if TYPE_CHECKING:
-    from palpate.green import GreensFunction
+from palpate.cli.describing import green_line, precision_line
+from palpate.cli.option_groups import grouped
+from palpate.cli.run_file import print_expected
+from palpate.errors import SceneError, StoreError
+from palpate.green import GreensFunction, plan, precompute
+from palpate.input_file import require_writable
+from palpate.scene import Scene
 
 # What counts for a scene, too.
 OF_SCENE = {"file", "dask"}
 
 
-@app.command()
-def precompute(
+@app.command("precompute")
+@grouped
+def precompute_command(
     context: typer.Context,
     file: Annotated[Path, typer.Argument(help="Volume mesh, a surface or segmentation to fill, or a scene (.toml).")],
     fix: Annotated[str | None, typer.Option(help="Supported nodes, such as 'z < 0.01' or 'z < min + 5mm'.")] = None,
@@ -59,15 +60,11 @@ def precompute(
         str | None, typer.Option(help="Touchable surface: 'z > 3cm', or a region of the mesh file; default: all.")
     ] = None,
     first: Annotated[
-        str | None,
-        typer.Option(help="Part to compute first; the store is written as soon as this part is ready."),
+        str | None, typer.Option(help="Part to compute first; the store is written as soon as this part is ready.")
     ] = None,
     element: ElementChoice = None,
-    max_size: MaxSize = None,
-    mesher: MesherChoice = None,
-    part: Part = None,
-    max_volume_loss: MaxVolumeLoss = None,
-    segment: Segments = None,
+    *,
+    filling: FillingOptions,
     memory: Annotated[
         str | None, typer.Option(help="Largest memory, such as 8GB; with --dask for each worker.")
     ] = None,
@@ -85,13 +82,6 @@ def precompute(
 
     Example: palpate precompute scene.toml --dask tcp://10.0.0.1:8786
     """
-    from palpate import units
-    from palpate.body import Loads, Material, surface_region
-    from palpate.cli.checks import require_body, require_store_name
-    from palpate.errors import SceneError, StoreError
-    from palpate.green import plan, precompute
-    from palpate.input_file import require_writable
-
     if file.suffix == ".toml":
         _precompute_scene(context, file, dask)
         return
@@ -105,10 +95,9 @@ def precompute(
     material = Material(modulus, poissons_ratio, mass)
     parts = () if gravity is None else gravity.split(",")
     loads = Loads(gravity=[read_option("--gravity", g, units.acceleration) for g in parts]) if parts else None
-    fill = fill_options(mesher, part, max_volume_loss, segment)
     with cluster(dask) as workers:
-        volume_mesh = in_unit(unit, lambda unit: read_any(file, unit, element, max_size, fill))
-        body = body_of(volume_mesh, materials_of(volume_mesh, material, segment), fix, loads)
+        volume_mesh = in_unit(unit, lambda unit: read_any(file, unit, element, filling))
+        body = body_of(volume_mesh, materials_of(volume_mesh, material, filling.segment), fix, loads)
         region = None if touch is None else surface_region(body, touch, "--touch")
         asked = {"precision": precision, "touch": region, "first": first}
         asked |= {"path": out, "memory": memory, "dask": workers}
@@ -125,10 +114,6 @@ def precompute(
 
 def _precompute_scene(context: typer.Context, file: Path, dask: str | None) -> None:
     """Solve the bodies of a scene, and compute their series."""
-    from palpate.cli.run_file import print_expected
-    from palpate.errors import SceneError
-    from palpate.scene import Scene
-
     for parameter in context.command.params:
         given = context.get_parameter_source(parameter.name or "")
         if parameter.name not in OF_SCENE and given is not None and given.name == "COMMANDLINE":

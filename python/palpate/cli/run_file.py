@@ -5,59 +5,74 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Annotated, Any
 
 import numpy as np
+import typer
+from pydantic import ValidationError
 
+from palpate import units
+from palpate.body import Body, Material
+from palpate.body.default_support import lowest_part
 from palpate.cli.bodies import (
-    Element,
-    Mesher,
+    BodyOptions,
+    FillingOptions,
     body_of,
-    fill_options,
     is_surface,
     likely_units,
     materials_of,
     read_any,
     segment_tables,
-    units_of_size,
 )
-from palpate.cli.option_values import read_option, require_unit
+from palpate.cli.checks import read_option, require_unit
+from palpate.cli.completion import devices
 from palpate.errors import SceneError
+from palpate.green import BackgroundPrecompute, GreensFunction, precompute
+from palpate.mesh import shapes, size_text
+from palpate.mesh.segmented import Draw
+from palpate.mesh.size import units_of_size
+from palpate.mesh.surface_file import load_surface
+from palpate.progress import Reporter, progress_reporter, status_line
+from palpate.scene import BuiltScene, Scene
+from palpate.scene.build import marked_as_growing
+from palpate.scene.default_radius import require_tool_sizes
+from palpate.scene.devices import KINDS, device_change, device_ranks
+from palpate.scene.early import Expected, pressing_radii
+from palpate.scene.mistakes import reason_of
+from palpate.scene.regions import DEFAULT_LAW
+from palpate.scene.series import with_stored_series
+from palpate.scene.tool_shape import KEYS
 from palpate.segmentation.endings import is_segmentation
-
-if TYPE_CHECKING:
-    from palpate.body import Body
-    from palpate.green import BackgroundPrecompute, GreensFunction
-    from palpate.mesh.segmented import Draw
-    from palpate.progress import Reporter
-    from palpate.scene import BuiltScene, Scene
-    from palpate.scene.early import Expected
+from palpate.simulation.scheduling import with_scheduling
+from palpate.units import length, length_scale
 
 
 @dataclass(frozen=True)
-class RunOptions:
+class RunOptions(FillingOptions, BodyOptions):
     """Options of the command, as they were typed; None for one that was not."""
 
-    radius: str | None = None
-    fix: str | None = None
-    youngs_modulus: str | None = None
-    poissons_ratio: float | None = None
-    density: str | None = None
-    unit: str | None = None
-    max_size: str | None = None
-    element: Element | None = None
-    mesher: Mesher | None = None
-    part: str | None = None
-    max_volume_loss: str | None = None
-    segment: tuple[str, ...] | None = None
-    cpus: str | None = None
-    priority: int | None = None
-    device: tuple[str, ...] | None = None
+    density: Annotated[str | None, typer.Option(help="Density; of a mesh, default: 1000kg/m3.")] = None
+    device: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Device of a tool: haply, touch, forcedimension, or the name of a [[device]]; repeat for the next "
+            "tool.",
+            autocompletion=devices,
+        ),
+    ] = None
+    cpus: Annotated[
+        str | None, typer.Option(help="Processors that the loop's thread keeps to, such as 1 or 2,3; default: any.")
+    ] = None
+    priority: Annotated[
+        int | None, typer.Option(help="Real-time priority of the loop's thread, 1 to 99; 0 asks for none; default: 80.")
+    ] = None
 
     def refuse(self, file: Path, allowed: set[str], reason: str, of_loop: bool = True) -> None:
         """Refuse options that the kind of file does not take; SceneError says which is the first of them, and why."""
         for field in fields(self):
-            if getattr(self, field.name) is not None and field.name not in (allowed | OF_LOOP if of_loop else allowed):
+            if getattr(self, field.name) not in (None, []) and field.name not in (
+                allowed | OF_LOOP if of_loop else allowed
+            ):
                 raise SceneError(f"{file}: {FLAGS[field.name]} is not for this file: {reason}")
 
 
@@ -69,9 +84,6 @@ FLAGS |= {"fixed": "--fix", "youngs_modulus": "-E", "poissons_ratio": "--nu"}
 
 def surface_of(file: Path, options: RunOptions) -> tuple[np.ndarray, np.ndarray] | None:
     """Vertices (k, 3), m, and triangles of a file's surface as it is, before it is filled; None for other files."""
-    from palpate.mesh.surface_file import load_surface
-    from palpate.scene import Scene
-    from palpate.units import length_scale
     from palpate.viewer.setup_session import merged
 
     path, unit = file, options.unit
@@ -85,7 +97,7 @@ def surface_of(file: Path, options: RunOptions) -> tuple[np.ndarray, np.ndarray]
         return None
     shape = load_surface(path).shape
     vertices = np.asarray(shape.vertices)
-    scale = length_scale(unit or units_of_size(path, vertices)[0])
+    scale = length_scale(unit or next(iter(units_of_size(vertices)), "m"))
     return merged(vertices * scale, np.asarray(shape.faces))
 
 
@@ -101,9 +113,6 @@ def built_from(
     ``drawn`` takes the boundary of a segmentation, vertices, m, and triangles, before it is filled. Raises Error for a
     file that cannot be read, filled or solved, or an option that does not belong to it.
     """
-    from palpate.progress import status_line
-    from palpate.scene import Scene
-
     if file.suffix == ".palpate":
         options.refuse(file, {"radius"}, "a store carries its material and supports; 'palpate precompute' takes them")
         scene = scene_with(Scene.of_store(file), options)
@@ -143,13 +152,11 @@ def scene_with(scene: Scene, options: RunOptions) -> Scene:
     if options.cpus is not None or options.priority is not None:
         update["device"] = _scheduled(scene.device, options)
     changed = scene.model_copy(update={**update, "bodies": bodies})
-    return changed if options.device is None else _with_devices(changed, options.device)
+    return _with_devices(changed, options.device) if options.device else changed
 
 
 def _with_devices(scene: Scene, devices: Sequence[str]) -> Scene:
     """Scene whose first tools are moved by devices: of a table by name, or of a kind, where its own stood."""
-    from palpate.scene.devices import KINDS, device_change, device_ranks
-
     if len(devices) > len(scene.tools):
         raise SceneError(f"--device was given {len(devices)} times, but the scene has {len(scene.tools)} of [[tool]]")
     tables = [scene.device, *scene.additional_devices]
@@ -171,8 +178,6 @@ def _with_devices(scene: Scene, devices: Sequence[str]) -> Scene:
 
 def _scheduled(device: Any, options: RunOptions) -> Any:
     """Table of the device with the processors and the priority that were typed."""
-    from palpate.simulation.scheduling import with_scheduling
-
     cpus = None
     if options.cpus is not None:
         try:
@@ -187,10 +192,6 @@ def _scheduled(device: Any, options: RunOptions) -> Any:
 
 def _changed(table: Any, values: Mapping[str, Any]) -> Any:
     """Table of the same kind with other values, as strictly checked as in a file."""
-    from pydantic import ValidationError
-
-    from palpate.scene.mistakes import reason_of
-
     try:
         return type(table)(**{**table.model_dump(exclude_unset=True), **values})
     except ValidationError as error:
@@ -201,9 +202,6 @@ def _changed(table: Any, values: Mapping[str, Any]) -> Any:
 
 
 def _radii(tool: Any, radius: str) -> dict[str, float]:
-    from palpate.scene.tool_shape import KEYS
-    from palpate.units import length
-
     if "radius" not in KEYS.get(tool.shape, (set(),))[0]:
         raise SceneError(f"--radius: a tool of shape '{tool.shape}' has no radius")
     value = read_option("--radius", radius, length)
@@ -220,17 +218,6 @@ def _bare(
     drawn: Draw | None,
 ) -> BuiltScene:
     """Take a mesh or a surface, with defaults for all that was not typed; which they are is printed."""
-    from palpate import units
-    from palpate.body import Material
-    from palpate.body.default_support import lowest_part
-    from palpate.mesh import size_text
-    from palpate.scene import BuiltScene, Scene
-    from palpate.scene.build import marked_as_growing
-    from palpate.scene.default_radius import require_tool_sizes
-    from palpate.scene.early import pressing_radii
-    from palpate.scene.regions import DEFAULT_LAW
-    from palpate.scene.series import with_stored_series
-
     require_unit(options.unit)
     defaults = []
     unit = options.unit
@@ -239,8 +226,7 @@ def _bare(
         defaults.append(f"unit {unit} (--unit{'; it may also be ' if others else ''}{' or '.join(others)})")
     # A body that is of no likely size in any unit is asked about, not taken for one in metres.
     known = None if options.unit is None and unit == "m" else unit
-    fill = fill_options(options.mesher, options.part, options.max_volume_loss, options.segment)
-    mesh = read_any(file, known, options.element, options.max_size, fill, progress, drawn)
+    mesh = read_any(file, known, options.element, options, progress, drawn)
     low, high = mesh.bounds
     fix = options.fix
     if fix is None:
@@ -283,11 +269,6 @@ def _green(
     body: Body, radii: Sequence[float], growing: dict[int, BackgroundPrecompute] | None, progress: bool | Reporter
 ) -> GreensFunction:
     """Compute what touches need: at first only where the page shows the middle, if the whole takes long."""
-    from palpate.green import BackgroundPrecompute, precompute
-    from palpate.mesh import shapes
-    from palpate.progress import Reporter, progress_reporter
-    from palpate.scene.early import Expected
-
     if isinstance(progress, Reporter):
         progress.phase("planning")
     expected = Expected.of(body, radii=radii)

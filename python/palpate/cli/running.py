@@ -2,73 +2,102 @@
 
 from __future__ import annotations
 
+import contextlib
 import shlex
 import sys
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
+import numpy as np
 import typer
 
-from palpate.cli.app import app
-from palpate.cli.bodies import (
-    ElementChoice,
-    Fix,
-    MaxSize,
-    MaxVolumeLoss,
-    MesherChoice,
-    MeshUnit,
-    Part,
-    PoissonsRatio,
-    Segments,
-    ToolRadius,
-    YoungsModulus,
-)
-from palpate.cli.completion import devices, models
-from palpate.cli.linking import Igtl, IgtlAxes, IgtlFrom, IgtlHost, LinkOptions, linked
-from palpate.cli.option_values import finite
+from palpate.cache import cached_files
+from palpate.cache_limit import cache_limit, kept_by_this_process
+from palpate.cli.app import INTERRUPTED, app, prepared, print_note
+from palpate.cli.checks import finite, require_body, require_places
+from palpate.cli.completion import models
+from palpate.cli.impulse import SECONDS, impulse_history, impulse_scene
+from palpate.cli.option_groups import grouped
+from palpate.cli.run_file import RunOptions, built_from, surface_of
+from palpate.cli.scripted import PressRecord, scripted_press
+from palpate.errors import ViewerError
+from palpate.green import BackgroundPrecompute
+from palpate.green.firmness import LOOSE, firmness
+from palpate.input_file import require_file
+from palpate.models import NAMES
+from palpate.progress import Reporter, progress_reporter, reported_to
+from palpate.scene import BuiltScene, Scene, model_scene
+from palpate.validation.plots import plot_log, write_log
+from palpate.viewer.surface_map import read_map
 
 if TYPE_CHECKING:
-    import numpy as np
-
-    from palpate.cli.run_file import RunOptions
-    from palpate.cli.scripted import PressRecord
-    from palpate.green import BackgroundPrecompute
-    from palpate.progress import Reporter
-    from palpate.scene import BuiltScene, Scene
-    from palpate.viewer.preparing import Prepared
+    from palpate.viewer.server import ViewerServer
 
 Headless = Annotated[
     float | None,
     typer.Option(min=0.1, callback=finite, help="Press by a script for this many seconds at 1 kHz, without a page."),
 ]
-Out = Annotated[Path, typer.Option(help="Folder for the log (CSV) and the plot (PNG) of --headless.")]
-Port = Annotated[int, typer.Option(min=0, max=65535, help="Port of the page; 0 takes a free one.")]
-Host = Annotated[str, typer.Option(help="Address to listen on; any other than 127.0.0.1 admits other machines.")]
-Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Open the browser.")]
-Cpus = Annotated[
-    str | None, typer.Option(help="Processors that the loop's thread keeps to, such as 1 or 2,3; default: any.")
-]
-Record = Annotated[
-    Path | None, typer.Option(help="Record every tick in a new file (.mcap), for 'palpate replay' and Foxglove.")
-]
-Priority = Annotated[
-    int | None, typer.Option(help="Real-time priority of the loop's thread, 1 to 99; 0 asks for none; default: 80.")
-]
-Devices = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--device",
-        help="Device of a tool: haply, touch, forcedimension, or the name of a [[device]]; repeat for the next tool.",
-        autocompletion=devices,
-    ),
-]
-Recordings = Annotated[Path, typer.Option(help="Folder for recordings and scenes of the page; default: this one.")]
-PORT = 8642
+
+
+@dataclass(frozen=True)
+class Page:
+    """Where the page is served, and whether it is opened."""
+
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the page; 0 takes a free one.")] = 8642
+    host: Annotated[str, typer.Option(help="Address to listen on; any other than 127.0.0.1 admits other machines.")] = (
+        "127.0.0.1"
+    )
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the browser.")] = True
+
+    @property
+    def address(self) -> tuple[str, int]:
+        """Host and port."""
+        return self.host, self.port
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """Where a run is recorded, and where its page puts recordings and scenes."""
+
+    record: Annotated[
+        Path | None, typer.Option(help="Record every tick in a new file (.mcap), for 'palpate replay' and Foxglove.")
+    ] = None
+    recordings: Annotated[
+        Path, typer.Option(help="Folder for recordings and scenes of the page; default: this one.")
+    ] = Path()
+
+
+@dataclass(frozen=True)
+class LinkOptions:
+    """What was asked for of OpenIGTLink."""
+
+    igtl: Annotated[
+        int | None,
+        typer.Option(
+            min=0, max=65535, help="Port of OpenIGTLink, such as 18944, for 3D Slicer and trackers; default: closed."
+        ),
+    ] = None
+    igtl_host: Annotated[
+        str, typer.Option(help="Address of OpenIGTLink; others than 127.0.0.1 let other machines move the tool.")
+    ] = "127.0.0.1"
+    igtl_axes: Annotated[
+        Literal["RAS", "LPS"], typer.Option(help="Axes of OpenIGTLink's messages, in millimetres.")
+    ] = "RAS"
+    igtl_from: Annotated[
+        str | None,
+        typer.Option(help="HOST:PORT of an OpenIGTLink server that sends poses, such as PLUS, to be called."),
+    ] = None
+
+    @property
+    def is_asked(self) -> bool:
+        """Whether anything is to be served or called."""
+        return self.igtl is not None or self.igtl_from is not None
 
 
 @app.command()
+@grouped
 def demo(
     model: Annotated[str, typer.Argument(help="doll, kidney, liver or beam.", autocompletion=models)] = "liver",
     paper: Annotated[bool, typer.Option("--paper", help="The mesh in the size of the paper.")] = False,
@@ -76,13 +105,11 @@ def demo(
     impulse: Annotated[
         bool, typer.Option("--impulse", help="A moving body of hard rubber, struck at its free end with 10 N for 1 ms.")
     ] = False,
-    record: Record = None,
-    recordings: Recordings = Path(),
+    *,
+    recorded: Recorded,
     headless: Headless = None,
     out: Annotated[Path | None, typer.Option(help="Folder for the CSV and PNG of --headless and --impulse.")] = None,
-    port: Port = PORT,
-    host: Host = "127.0.0.1",
-    browser: Browser = True,
+    page: Page,
 ) -> None:
     """Press on a built-in model in the browser.
 
@@ -95,61 +122,40 @@ def demo(
 
     Example: palpate demo beam --impulse --paper --out results
     """
-    from palpate.cli.checks import require_places
-    from palpate.cli.impulse import SECONDS, impulse_history, impulse_scene
-    from palpate.models import NAMES
-    from palpate.scene import model_scene
 
     def scene_of(name: str) -> Scene:
         return impulse_scene(name, paper) if impulse else model_scene(name, paper, motion)
 
-    require_places(record, out, None if headless is not None or (impulse and out is not None) else (host, port))
+    has_page = headless is None and not (impulse and out is not None)
+    require_places(recorded.record, out, page.address if has_page else None)
     if impulse and (headless is not None or out is not None):
         impulse_history(model, paper, headless or SECONDS, out or Path())
         return
-    built = _build(scene_of(model))
+    built = prepared(scene_of(model))
     _print_cache_use()
     if headless is not None:
-        _scripted(built, f"{model}-paper" if paper else model, headless, out or Path(), record)
+        _scripted(built, f"{model}-paper" if paper else model, headless, out or Path(), recorded.record)
         return
-    _view(built, _Page(host, port, browser, recordings), NAMES, scene_of, record)
+    _view(built, page, recorded, NAMES, scene_of)
 
 
 @app.command()
+@grouped
 def run(
     file: Annotated[
         Path | None,
         typer.Argument(help="Scene (.toml), store, volume mesh, surface or segmentation; none: an empty page."),
     ] = None,
-    radius: ToolRadius = None,
-    fix: Fix = None,
-    youngs_modulus: YoungsModulus = None,
-    poissons_ratio: PoissonsRatio = None,
-    density: Annotated[str | None, typer.Option(help="Density; of a mesh, default: 1000kg/m3.")] = None,
-    unit: MeshUnit = None,
-    max_size: MaxSize = None,
-    element: ElementChoice = None,
-    mesher: MesherChoice = None,
-    part: Part = None,
-    max_volume_loss: MaxVolumeLoss = None,
-    segment: Segments = None,
+    *,
+    options: RunOptions,
     surface_map: Annotated[
         Path | None, typer.Option("--map", help="Map of 'palpate map' to show: stiffness.vtu or detection.vtu.")
     ] = None,
-    device: Devices = None,
-    cpus: Cpus = None,
-    priority: Priority = None,
-    record: Record = None,
-    recordings: Recordings = Path(),
+    recorded: Recorded,
     headless: Headless = None,
-    out: Out = Path(),
-    port: Port = PORT,
-    host: Host = "127.0.0.1",
-    browser: Browser = True,
-    igtl: Igtl = None,
-    igtl_host: IgtlHost = "127.0.0.1",
-    igtl_axes: IgtlAxes = "RAS",
-    igtl_from: IgtlFrom = None,
+    out: Annotated[Path, typer.Option(help="Folder for the log (CSV) and the plot (PNG) of --headless.")] = Path(),
+    page: Page,
+    link: LinkOptions,
 ) -> None:
     """Run the 1 kHz force loop on a scene, a store, or a bare mesh or surface, in the browser.
 
@@ -177,90 +183,56 @@ def run(
 
     Without a FILE the page is empty: drop a surface on it, and set the body up there.
     """
-    from palpate.cli.checks import require_body, require_places
-    from palpate.cli.run_file import RunOptions, built_from
-
-    page = _Page(host, port, browser, recordings, LinkOptions(igtl, igtl_host, igtl_axes, igtl_from))
-    lengths = {"unit": unit, "max_size": max_size, "element": element}
-    lengths |= {"mesher": mesher, "part": part, "max_volume_loss": max_volume_loss}
-    lengths |= {"segment": tuple(segment) if segment else None}
-    material = {"youngs_modulus": youngs_modulus, "poissons_ratio": poissons_ratio, "density": density}
-    of_loop = {"cpus": cpus, "priority": priority, "device": tuple(device) if device else None}
-    options = RunOptions(radius=radius, fix=fix, **material, **lengths, **of_loop)
-    if page.link.is_asked and (file is None or headless is not None):
+    if link.is_asked and (file is None or headless is not None):
         raise typer.BadParameter("--igtl and --igtl-from need a FILE, and no --headless")
     if file is None:
         options.refuse(Path("an empty page"), set(), "what belongs to a body is chosen in the page", of_loop=False)
-        if surface_map is not None or headless is not None or record is not None:
+        if surface_map is not None or headless is not None or recorded.record is not None:
             raise typer.BadParameter("--map, --headless and --record need a FILE")
-        _view(None, page)
+        _view(None, page, recorded)
         return
     if headless is not None:
         if surface_map is not None:
             raise typer.BadParameter("--map is shown in the page: leave out --headless")
         require_body(file)
-        require_places(record, out)
+        require_places(recorded.record, out)
         built = built_from(file, options)
         _print_cache_use()
         _print_loose(built)
-        _scripted(built, file.stem, headless, out, record)
+        _scripted(built, file.stem, headless, out, recorded.record)
         return
-    _view_early(file, options, page, record, surface_map)
-
-
-def _build(scene: Scene) -> BuiltScene:
-    from palpate.progress import status_line
-
-    with status_line(f"preparing {scene.name}"):
-        return scene.build()
-
-
-@dataclass(frozen=True)
-class _Page:
-    """Where the page is served, whether it is opened, where it puts recordings, and who else is linked."""
-
-    host: str
-    port: int
-    browser: bool
-    recordings: Path
-    link: LinkOptions = field(default_factory=LinkOptions)
+    _view_early(file, options, page, recorded, link, surface_map)
 
 
 def _view(
     built: BuiltScene | None,
-    page: _Page,
+    page: Page,
+    recorded: Recorded,
     models: Sequence[str] = (),
     scene_of: Callable[[str], Scene] | None = None,
-    record: Path | None = None,
 ) -> None:
     from palpate.viewer.live import PRESS, SET_UP, open_viewer
     from palpate.viewer.server import ViewerServer
 
-    page.recordings.mkdir(parents=True, exist_ok=True)
-    files = {"record": record, "recordings": page.recordings}
-    server = ViewerServer(built, host=page.host, port=page.port, models=models, scene_of=scene_of, **files)
+    recorded.recordings.mkdir(parents=True, exist_ok=True)
+    server = ViewerServer(built, host=page.host, port=page.port, models=models, scene_of=scene_of, **vars(recorded))
     open_viewer(server, browser=page.browser, hint=SET_UP if built is None else PRESS)
 
 
-def _view_early(file: Path, options: RunOptions, page: _Page, record: Path | None, surface_map: Path | None) -> None:
+def _view_early(
+    file: Path, options: RunOptions, page: Page, recorded: Recorded, link: LinkOptions, surface_map: Path | None
+) -> None:
     """Open the page at once, and prepare what is touched while it shows the surface and the stages."""
-    from palpate.cli.checks import require_body, require_places
-    from palpate.cli.run_file import built_from, surface_of
-    from palpate.errors import ViewerError
-    from palpate.input_file import require_file
-    from palpate.progress import progress_reporter, reported_to
     from palpate.viewer.live import open_viewer
     from palpate.viewer.preparing import Preparation, Prepared, PreparingSession
     from palpate.viewer.server import ViewerServer
-    from palpate.viewer.surface_map import read_map
 
     require_body(file)
-    require_places(record, None, (page.host, page.port))
+    require_places(recorded.record, None, page.address)
     if surface_map is not None:
         require_file(surface_map, ViewerError)
-    page.recordings.mkdir(parents=True, exist_ok=True)
-    files = {"record": record, "recordings": page.recordings}
-    server = ViewerServer(PreparingSession(), host=page.host, port=page.port, **files)
+    recorded.recordings.mkdir(parents=True, exist_ok=True)
+    server = ViewerServer(PreparingSession(), host=page.host, port=page.port, **vars(recorded))
 
     def build(reporter: Reporter, draw: Callable[[np.ndarray, np.ndarray], None]) -> Prepared:
         surface = surface_of(file, options)
@@ -275,15 +247,12 @@ def _view_early(file: Path, options: RunOptions, page: _Page, record: Path | Non
         maps = None if surface_map is None else read_map(surface_map, built)
         return Prepared(built, growing, maps)
 
-    with linked(server, page.link, page.recordings):
+    with linked(server, link, recorded.recordings):
         open_viewer(server, browser=page.browser, preparation=Preparation(file.name, build))
 
 
 def _print_cache_use() -> None:
     """Print what stays in the cache of what was prepared."""
-    from palpate.cache import cached_files
-    from palpate.cache_limit import cache_limit, kept_by_this_process
-
     size = kept_by_this_process()
     if size:
         used, limit = sum(file.size for file in cached_files()) / 1e9, cache_limit().size / 1e9
@@ -293,16 +262,13 @@ def _print_cache_use() -> None:
 
 def _print_loose(built: BuiltScene) -> None:
     """Note bodies that hang by so little that a press on them is hardly felt."""
-    from palpate.green.firmness import LOOSE, firmness
-
     radius = built.scene.tools[0].contact_radius or built.scene.tools[0].radius or 0.0
     for body in built.bodies:
         share = firmness(body.green, radius)
         if share is not None and share < LOOSE:
-            print(
-                f"palpate: note: {body.name} is held loosely: its top has {share:.1g} of the stiffness of a half-space "
-                "of the same material; hold more of it (--fix, [supports])",
-                file=sys.stderr,
+            print_note(
+                f"{body.name} is held loosely: its top has {share:.1g} of the stiffness of a half-space of the same "
+                "material; hold more of it (--fix, [supports])"
             )
 
 
@@ -329,9 +295,6 @@ def _strain_line(record: PressRecord, strain_limit: float) -> str:
 
 
 def _scripted(built: BuiltScene, name: str, seconds: float, out: Path, recording: Path | None) -> None:
-    from palpate.cli.scripted import scripted_press
-    from palpate.validation.plots import plot_log, write_log
-
     out.mkdir(parents=True, exist_ok=True)
     record = scripted_press(built, seconds, recording)
     log, statistics = record.log, record.last.statistics
@@ -350,12 +313,32 @@ def _scripted(built: BuiltScene, name: str, seconds: float, out: Path, recording
         print(f"recorded {recording}: to compute it again: palpate replay {shlex.quote(str(recording))}")
     priority, locked_memory = statistics["realtime"]
     if not (locked_memory and (priority or built.scene.device.priority == 0)):
-        print(
-            "palpate: note: the system granted no real-time priority or locked memory; see 'palpate doctor'",
-            file=sys.stderr,
-        )
+        print_note("the system granted no real-time priority or locked memory; see 'palpate doctor'")
     if record.interrupted:
-        raise typer.Exit(130)
+        raise typer.Exit(INTERRUPTED)
     if statistics["fault"] is not None:
         print(f"palpate: {statistics['fault']}", file=sys.stderr)
         raise typer.Exit(1)
+
+
+@contextlib.contextmanager
+def linked(server: ViewerServer, options: LinkOptions, folder: Path) -> Iterator[None]:
+    """Serve OpenIGTLink for the scene that a page's server runs; ViewerError for a port in use."""
+    if not options.is_asked:
+        yield
+        return
+    from palpate.openigtlink import Axes, Link, LinkServer
+
+    link = Link(lambda: getattr(server.session, "simulation", None), Axes(options.igtl_axes), folder)
+    tracker = None if options.igtl_from is None else _address(options.igtl_from)
+    with LinkServer(link, options.igtl, host=options.igtl_host, tracker=tracker) as served:
+        if served.port is not None:
+            print(f"OpenIGTLink is at {options.igtl_host}:{served.port}, in mm and {options.igtl_axes}", flush=True)
+        yield
+
+
+def _address(text: str) -> tuple[str, int]:
+    host, colon, port = text.rpartition(":")
+    if not (colon and host and port.isascii() and port.isdigit() and 0 < int(port) < 65536):
+        raise typer.BadParameter(f"--igtl-from takes HOST:PORT, got '{text}'")
+    return host, int(port)

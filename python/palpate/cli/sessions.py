@@ -1,30 +1,40 @@
-"""Commands that export and compare recordings."""
+"""Commands that replay, export and compare recordings."""
 
 from __future__ import annotations
 
 import json
 import sys
 import warnings
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from palpate.cli.app import app
+from palpate import sessions, simulation
+from palpate.cli.app import app, prepared
+from palpate.cli.checks import read_option, require_folder
 from palpate.cli.completion import formats
-from palpate.cli.option_values import read_option
+from palpate.cli.option_groups import grouped
+from palpate.cli.running import Page
+from palpate.errors import Error, RecordingWarning, SceneError
+from palpate.scene import Scene
+from palpate.sessions import FORMATS, Comparison, QuantityDifference, rerun
+from palpate.sessions import compare as compared
+from palpate.simulation import Recording, Replayed
+from palpate.units import time
+from palpate.validation.plots import plot_comparison
 
-if TYPE_CHECKING:
-    from palpate.sessions import Comparison, QuantityDifference
-    from palpate.simulation import Recording
+RecordingFile = Annotated[Path, typer.Argument(help="Recording (.mcap) of 'palpate run --record' or of a program.")]
+# Differences that are printed; more are only counted.
+SHOWN = 10
 
 
 @app.command()
 def export(
     file: Annotated[Path, typer.Argument(help="A recording (.mcap).")],
     to: Annotated[
-        str | None,
-        typer.Option(help="csv, parquet, pvd, glb or mp4; default: as --out.", autocompletion=formats),
+        str | None, typer.Option(help="csv, parquet, pvd, glb or mp4; default: as --out.", autocompletion=formats)
     ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="File to write; default: beside the recording.")
@@ -47,10 +57,6 @@ def export(
 
     Example: palpate export press.mcap --out results/press.pvd --rate 60
     """
-    from palpate import sessions
-    from palpate.scene import Scene
-    from palpate.units import time
-
     target = _target(file, to, out)
     recording = _loaded(file)
     span = {"start": read_option("--from", start, time)}
@@ -62,9 +68,6 @@ def export(
 
 def _target(file: Path, to: str | None, out: Path | None) -> Path:
     """File to write; Error for no format, an unknown one, or two that contradict each other."""
-    from palpate.errors import Error
-    from palpate.sessions import FORMATS
-
     known = ", ".join(f"{ending[1:]} ({what})" for ending, what in FORMATS.items())
     if to is not None and f".{to}" not in FORMATS:
         raise Error(f"--to {to}: unknown format; known are {known}")
@@ -95,10 +98,6 @@ def compare(
 
     Example: palpate compare press.mcap --scene stiffer.toml
     """
-    from palpate.cli.checks import require_folder
-    from palpate.errors import Error
-    from palpate.sessions import compare as compared
-
     if (b is None) == (scene is None):
         raise Error("compare takes two recordings, or one and --scene")
     if out is not None:
@@ -119,20 +118,11 @@ def compare(
 
 
 def _rerun(recording: Recording, scene: Path) -> Recording:
-    from palpate.progress import status_line
-    from palpate.scene import Scene
-    from palpate.sessions import rerun
-
-    read = Scene.read(scene)
-    with status_line(f"preparing {read.name}"):
-        built = read.build()
-    return rerun(recording, built, progress=True)
+    return rerun(recording, prepared(Scene.read(scene)), progress=True)
 
 
 def _write(out: Path, both: tuple[Recording, Recording], files: tuple[Path, Path], keep: bool) -> None:
     """Write the plot, and the second recording where there is no file of it."""
-    from palpate.validation.plots import plot_comparison
-
     out.mkdir(parents=True, exist_ok=True)
     name = f"{files[0].stem}-{files[1].stem}"
     plot_comparison(*both, (files[0].name, files[1].name), out / f"{name}.png")
@@ -145,9 +135,6 @@ def _write(out: Path, both: tuple[Recording, Recording], files: tuple[Path, Path
 
 def _loaded(file: Path) -> Recording:
     """Read a recording, and tell of one that is not whole."""
-    from palpate.errors import RecordingWarning
-    from palpate.simulation import Recording
-
     recording = Recording.load(file)
     if recording.dropped is None:
         length = f"{recording.time[-1]:.3f} s" if len(recording.time) else "nothing"
@@ -199,8 +186,64 @@ def _text_of(value: object) -> str:
 
 
 def _as_json(found: Comparison) -> dict:
-    from dataclasses import asdict
-
     first = None if found.first is None else found.first.first
     settings = [dict(zip(("key", "a", "b"), row, strict=True)) for row in found.settings]
     return {**asdict(found), "settings": settings, "same": found.same, "first": first}
+
+
+@app.command()
+@grouped
+def replay(
+    file: RecordingFile,
+    scene: Annotated[
+        Path | None, typer.Option(help="Scene file that should give the same; default: the scene of the recording.")
+    ] = None,
+    headless: Annotated[
+        bool, typer.Option("--headless", help="No viewer: only print whether every bit is the same.")
+    ] = False,
+    *,
+    page: Page,
+) -> None:
+    """Replay a recording tick by tick and compare every bit, in the browser with a time line, or headless.
+
+    With --headless the exit code is 0 if all bits are the same, 1 if one is not, and 2 if the recording cannot be made
+    again.
+
+    Example: palpate replay press.mcap
+
+    Example: palpate replay press.mcap --headless
+    """
+    recording = Recording.load(file)
+    given = None if scene is None else Scene.read(scene)
+    try:
+        if not headless:
+            from palpate.viewer.live import open_replay
+
+            open_replay(recording, given, **vars(page))
+            return
+        replayed = simulation.replay(recording, given, progress=True)
+        if replayed.ticks == 0:
+            raise SceneError("no tick of it can be computed again: the file was cut short, or nothing was recorded")
+    except SceneError as error:
+        raise SceneError(f"{file}: {error}") from error
+    print(_report_text(file, recording, replayed))
+    if not replayed.same:
+        raise typer.Exit(1)
+
+
+def _report_text(file: Path, recording: Recording, replayed: Replayed) -> str:
+    lines = [str(difference) for difference in replayed.differences[:SHOWN]]
+    if len(replayed.differences) > SHOWN:
+        lines.append(f"and {len(replayed.differences) - SHOWN} more: look at the first")
+    if not lines:
+        lines = [f"{file}: {replayed.ticks} ticks computed again: every bit is as recorded"]
+    if not replayed.whole:
+        lines.append(_gap_text(recording, replayed.ticks))
+    return "\n".join(lines)
+
+
+def _gap_text(recording: Recording, ticks: int) -> str:
+    """Say why a recording could not be made again to its end."""
+    if recording.dropped is None:
+        return f"note: the file was cut short, by a crash or a full disk; it has {len(recording.ticks)} ticks"
+    return f"note: {recording.dropped} ticks were not recorded; what follows tick {ticks - 1} was not computed again"

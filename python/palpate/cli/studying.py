@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
+import numpy as np
 import typer
 
-from palpate.cli.app import app
-from palpate.cli.bodies import Dask
-
-if TYPE_CHECKING:
-    from palpate.study import StudyResult
+from palpate.cli.app import app, keeping, print_note
+from palpate.cli.bodies import Dask, cluster
+from palpate.cli.checks import require_folder
+from palpate.study import Study, StudyResult
+from palpate.units import count_text
 
 
 @app.command()
@@ -30,29 +30,16 @@ def study(
 
     Example: palpate study patients.toml --out patients --dask tcp://10.0.0.1:8786
     """
-    from palpate.cli.bodies import cluster
-    from palpate.cli.checks import require_folder
-    from palpate.study import Study
-
     folder = out if out is not None else Path(f"{file.stem}-study")
     require_folder(folder)
     read = Study.read(file)
-    with cluster(dask) as workers:
-        try:
-            result = read.run(folder, dask=workers)
-        except KeyboardInterrupt:
-            text = f"palpate: finished bodies are kept in {folder}, and the same command continues"
-            print(text, file=sys.stderr)
-            raise typer.Exit(130) from None
+    with cluster(dask) as workers, keeping("bodies", folder):
+        result = read.run(folder, dask=workers)
     _print_result(result, folder)
 
 
 def _print_result(result: StudyResult, folder: Path) -> None:
     """Write the results, and say what was found and what could not be."""
-    import numpy as np
-
-    from palpate.units import count_text
-
     cases = len(np.unique(result.columns["case"]))
     known = f", {result.resumed} of them known before" if result.resumed else ""
     print(f"{count_text(cases, 'body', 'bodies')}{known}; varied: {', '.join(result.varied) or 'nothing'}")
@@ -62,9 +49,9 @@ def _print_result(result: StudyResult, folder: Path) -> None:
         error = np.nanmax(result.columns["error"])
         print(f"stiffness from {low:.4g} to {high:.4g} N/m, errors of solving up to {error:.1g}")
     for note in result.notes:
-        print(f"palpate: note: {note}", file=sys.stderr)
+        print_note(note)
     print(f"wrote {folder}: {', '.join(path.name for path in result.save(folder))}")
     for number, problem in result.problems.items():
-        print(f"palpate: error: case {number}: {problem}", file=sys.stderr)
+        print_note(f"case {number}: {problem}", "error")
     if result.problems:
         raise typer.Exit(2)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import permutations
 
 import numpy as np
 
 from palpate.body import Body, Material
 from palpate.green import precompute
 from palpate.mesh import TetMesh
+from palpate.mesh.elements import kuhn_tets
 from palpate.scene import BuiltScene, Scene
 
 # Sides of a slab, m, and cells along them.
@@ -64,20 +64,6 @@ def _solved(nodule: np.ndarray | None) -> Slab:
 
 
 def _mesh() -> TetMesh:
-    """Cells of six tetrahedra around a diagonal (Kuhn 1960)."""
     axes = [np.linspace(0.0, side, cells + 1) for side, cells in zip(SIDES, CELLS, strict=True)]
     nodes = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
-    number = np.arange(len(nodes)).reshape(CELLS + 1)
-    tets = []
-    for order in permutations(range(3)):
-        corner = np.zeros(3, int)
-        path = [corner.copy()]
-        for axis in order:
-            corner[axis] += 1
-            path.append(corner.copy())
-        odd = np.linalg.det(np.diff(path, axis=0)) < 0
-        if odd:
-            path[2], path[1] = path[1], path[2]
-        cells = [number[tuple(slice(c, c + n) for c, n in zip(p, CELLS, strict=True))].ravel() for p in path]
-        tets.append(np.stack(cells, 1))
-    return TetMesh(nodes, np.concatenate(tets))
+    return TetMesh(nodes, kuhn_tets(CELLS + 1))

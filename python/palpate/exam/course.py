@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.exam.library import Library
-from palpate.exam.psychometric import Estimate, Psychometrics
+from palpate.exam.psychometric import Estimate
 from palpate.exam.staircase import Staircase
 
 
@@ -48,23 +48,19 @@ class Course:
     def __init__(self, library: Library, seed: int):
         self.library, self.seed = library, seed
         question = library.exam.question
-        self._count = question.trials + question.blanks
-        order = np.random.default_rng([seed, 0]).permutation(self._count)
+        # Those with nothing hidden too.
+        self.count = question.trials + question.blanks
+        order = np.random.default_rng([seed, 0]).permutation(self.count)
         self._blank = set(order[: question.blanks].tolist())
         felt = library.staircase_contrasts
         self._staircase = Staircase(float(felt.min()), float(felt.max()), question.target)
         self.answers: list[TrialAnswer] = []
 
     @property
-    def count(self) -> int:
-        """How many trials there are, those with nothing hidden too."""
-        return self._count
-
-    @property
     def trial(self) -> Trial | None:
         """The question that is to be answered; None at the end."""
         rank = len(self.answers)
-        if rank == self._count:
+        if rank == self.count:
             return None
         return Trial(rank + 1, None if rank in self._blank else self._chosen(rank))
 
@@ -101,14 +97,8 @@ class Course:
         where = None if marked is None else (float(marked[0]), float(marked[1]), float(marked[2]))
         return TrialAnswer(trial, where, place, distance, score, seconds)
 
-    def estimate(self, psychometrics: Psychometrics | None = None) -> Estimate:
-        """Weber fraction by the answers so far, over nodules; ``psychometrics`` of the library saves work."""
-        prepared = psychometrics or psychometrics_of(self.library)
+    def estimate(self) -> Estimate:
+        """Weber fraction by the answers so far, over nodules."""
         asked = [(answer.trial.nodule, answer.score) for answer in self.answers if answer.trial.nodule is not None]
         which, scores = np.array([nodule for nodule, _ in asked], dtype=int), np.array([score for _, score in asked])
-        return prepared.estimate(which, scores)
-
-
-def psychometrics_of(library: Library) -> Psychometrics:
-    """Likelihoods of answers over every nodule of a library."""
-    return Psychometrics(library.felt_contrasts, len(library.places.points))
+        return self.library.psychometrics.estimate(which, scores)

@@ -159,25 +159,22 @@ class ExamFile(Scene):
 
     def _check(self) -> None:
         """Refuse what an exam cannot have."""
-        self._require(len(self.bodies) == 1, ["body", 1], "body: an exam has one body")
-        self._require(len(self.tools) == 1, ["tool", 1], "tool: an exam has one tool")
-        self._require(self.bodies[0].store is None, ["body", 0, "store"], "body.store: a store has no inside")
-        moves = self.bodies[0].dynamics or self.dynamics
-        self._require(moves is None, ["dynamics"], "dynamics: the body of an exam is at rest")
-        loads = self.loads or self.bodies[0].loads
-        sags = "loads: a body of an exam has none, for it would sag less around a nodule, and an eye could see that"
-        self._require(not loads, ["loads"], sags)
-        shape = self.tools[0].shape
-        known = f"tool.shape: an exam takes {', '.join(KEYS)}, not a surface file"
-        self._require(shape in KEYS, ["tool", 0, "shape"], known)
-        nodule = self.nodule
+        body, shape, nodule = self.bodies[0], self.tools[0].shape, self.nodule
         count = self.question.alternatives * len(nodule.radii) * len(nodule.depths) * nodule.contrast.count
-        text = f"nodule: {count} nodules by place, radius, depth and contrast; an exam takes at most {MOST_BODIES}"
-        self._require(count <= MOST_BODIES, ["nodule"], text)
-
-    def _require(self, holds: bool, place: list[str | int], message: str) -> None:
-        if not holds:
-            raise self.mistake(place, message)
+        sags = "loads: a body of an exam has none, for it would sag less around a nodule, and an eye could see that"
+        known = f"tool.shape: an exam takes {', '.join(KEYS)}, not a surface file"
+        many = f"nodule: {count} nodules by place, radius, depth and contrast; an exam takes at most {MOST_BODIES}"
+        for holds, place, message in (
+            (len(self.bodies) == 1, ["body", 1], "body: an exam has one body"),
+            (len(self.tools) == 1, ["tool", 1], "tool: an exam has one tool"),
+            (body.store is None, ["body", 0, "store"], "body.store: a store has no inside"),
+            ((body.dynamics or self.dynamics) is None, ["dynamics"], "dynamics: the body of an exam is at rest"),
+            (not (self.loads or body.loads), ["loads"], sags),
+            (shape in KEYS, ["tool", 0, "shape"], known),
+            (count <= MOST_BODIES, ["nodule"], many),
+        ):
+            if not holds:
+                raise self.mistake(place, message)
 
     def mistake(self, place: list[str | int], message: str) -> SceneError:
         """Return the error of a place in the file."""

@@ -10,7 +10,6 @@ Felt contrast. Pressed to the depth `d` the tool feels the secant stiffness `F/d
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -21,10 +20,11 @@ import numpy as np
 
 from palpate.atomic import written_beside
 from palpate.body import Body, Material, parse
-from palpate.cache import cache_directory
+from palpate.cache import cache_directory, digest
 from palpate.errors import MeshError, SceneError
 from palpate.exam.file import ExamFile
 from palpate.exam.pressing import Places, forces_at, places_of
+from palpate.exam.psychometric import Psychometrics
 from palpate.green import GreensFunction, precompute
 from palpate.mesh import TetMesh, shapes
 from palpate.mesh.elements import FACES
@@ -113,6 +113,11 @@ class Library:
         return np.maximum(self.felt_contrasts, LEAST_CONTRAST)
 
     @cached_property
+    def psychometrics(self) -> Psychometrics:
+        """Likelihoods of answers over every nodule."""
+        return Psychometrics(self.felt_contrasts, len(self.places.points))
+
+    @cached_property
     def groups(self) -> list[np.ndarray]:
         """Numbers of the nodules that differ by their contrast alone, for each place, radius and depth."""
         kinds: dict[tuple[int, float, float], list[int]] = {}
@@ -150,12 +155,9 @@ class Library:
         closest = np.argmin(np.linalg.norm(centres - middle, axis=1))
         modulus, ratio, density = plain.element_materials[closest].tolist()
         hard = Material(modulus * nodule.contrast, ratio, density)
-        labels = np.unique(plain.mesh.regions).tolist()
-        tissue = {
-            label: Material(*plain.element_materials[plain.mesh.regions == label][0].tolist()) for label in labels
-        }
-        materials = {label: material for label, material in tissue.items() if (mesh.regions == label).any()}
-        return Body(mesh, material={**materials, "hidden nodule": hard}, fixed=plain.fixed_mask)
+        left = np.setdiff1d(mesh.regions, mesh.region_names["hidden nodule"]).tolist()
+        tissue = {k: Material(*plain.element_materials[plain.mesh.regions == k][0].tolist()) for k in left}
+        return Body(mesh, material={**tissue, "hidden nodule": hard}, fixed=plain.fixed_mask)
 
     def _check(self, mesh: TetMesh, inside: np.ndarray, nodule: Nodule) -> None:
         """Refuse a nodule that is not what the file says in this mesh."""
@@ -210,13 +212,13 @@ class _ForceCache:
     """Forces at the places of an exam by the key of the store, kept in a file of the cache."""
 
     def __init__(self, exam: ExamFile, places: Places):
-        content = json.dumps([version("palpate"), exam.force_settings(), places.points.tolist()], sort_keys=True)
-        self._path = cache_directory() / f"{hashlib.sha256(content.encode()).hexdigest()[:32]}.felt.palpate"
+        key = digest([version("palpate"), exam.force_settings(), places.points.tolist()])
+        self._path = cache_directory() / f"{key[:32]}.felt.palpate"
         self.forces: dict[str, list[float]] = {}
         if self._path.exists():
             try:
                 cached = json.loads(self._path.read_text())
-                if cached["sum"] != _sum(cached["forces"]):
+                if cached["sum"] != digest(cached["forces"]):
                     raise ValueError("damaged")
                 self.forces = cached["forces"]
             except (ValueError, KeyError, TypeError):
@@ -226,8 +228,4 @@ class _ForceCache:
         self.forces[key] = row
         self._path.parent.mkdir(parents=True, exist_ok=True)
         with written_beside(self._path) as partial:
-            partial.write_text(json.dumps({"forces": self.forces, "sum": _sum(self.forces)}))
-
-
-def _sum(forces: dict[str, list[float]]) -> str:
-    return hashlib.sha256(json.dumps(forces, sort_keys=True).encode()).hexdigest()
+            partial.write_text(json.dumps({"forces": self.forces, "sum": digest(self.forces)}))

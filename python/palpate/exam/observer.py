@@ -10,35 +10,22 @@ from __future__ import annotations
 
 import numpy as np
 
-from palpate.exam.course import Course, psychometrics_of
+from palpate.exam.course import Course
 from palpate.exam.library import Library
 from palpate.exam.psychometric import Estimate
 
 
-class Observer:
-    """Answers trials; the Weber fraction is the standard deviation of what is felt, over what there is to be felt."""
-
-    def __init__(self, weber_fraction: float, seed: int):
-        self._weber_fraction = weber_fraction
-        self._noise = np.random.default_rng([seed, 2])
-
-    def place(self, library: Library, nodule: int | None) -> int:
-        """Place at which it marks a body."""
-        forces = library.plain_forces if nodule is None else library.forces[nodule]
-        felt = forces * (1.0 + self._weber_fraction * self._noise.standard_normal(len(forces)))
-        return int(np.argmax(felt / library.plain_forces))
-
-
 def simulated_exam(library: Library, weber_fraction: float, seed: int) -> Course:
     """Take a whole exam by an observer."""
-    course, observer = Course(library, seed), Observer(weber_fraction, seed)
+    course, noise = Course(library, seed), np.random.default_rng([seed, 2])
     while (trial := course.trial) is not None:
-        place = observer.place(library, trial.nodule)
+        forces = library.plain_forces if trial.nodule is None else library.forces[trial.nodule]
+        felt = forces * (1.0 + weber_fraction * noise.standard_normal(len(forces)))
+        place = int(np.argmax(felt / library.plain_forces))
         course.answer(library.places.points[place].tolist(), 0.0)
     return course
 
 
 def simulated_exams(library: Library, weber_fraction: float, exams: int, seed: int = 0) -> list[Estimate]:
     """Estimates of so many exams by an observer, with seeds that follow each other."""
-    prepared = psychometrics_of(library)
-    return [simulated_exam(library, weber_fraction, seed + rank).estimate(prepared) for rank in range(exams)]
+    return [simulated_exam(library, weber_fraction, seed + rank).estimate() for rank in range(exams)]

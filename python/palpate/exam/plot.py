@@ -44,8 +44,7 @@ def _draw_staircase(axes: Axes, numbers: np.ndarray, felt: np.ndarray, scores: n
         axes.axhline(100 * result.felt_contrast, color="0.2", linewidth=1, linestyle="--", label=seek)
     _logarithmic(axes.yaxis)
     axes.xaxis.get_major_locator().set_params(integer=True)
-    axes.set_xlabel("trial")
-    axes.set_ylabel("felt contrast dK/K [%]")
+    axes.set(xlabel="trial", ylabel="felt contrast dK/K [%]")
     axes.set_title("staircase", loc="left")
     axes.legend(frameon=False, loc="best")
 
@@ -80,7 +79,5 @@ def _draw_function(axes: Axes, felt: np.ndarray, scores: np.ndarray, result: Res
     axes.axhline(100 / estimate.alternatives, color="0.5", linewidth=1, linestyle=":")
     axes.axvline(100 * estimate.weber_fraction, color=COLORS[1], linewidth=1, linestyle="--")
     _logarithmic(axes.xaxis)
-    axes.set_ylim(0, 103)
-    axes.set_xlabel("felt contrast dK/K [%]")
-    axes.set_ylabel("found [%]")
+    axes.set(ylim=(0, 103), xlabel="felt contrast dK/K [%]", ylabel="found [%]")
     axes.set_title(f"Weber fraction {fraction_text(estimate)}", loc="left")

@@ -1,12 +1,17 @@
-"""Results for other programs: meshio meshes with displacement, strain and stress at the nodes, and their files.
+"""Results for other programs and for people: meshio meshes with displacement, strain and stress, files, pictures.
 
 Tensors are written by their six components in the order of VTK: xx, yy, zz, xy, yz, xz.
 """
 
 from __future__ import annotations
 
+import base64
+import html
+import io
 import os
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,17 +19,19 @@ import numpy as np
 
 from palpate.atomic import written_beside
 from palpate.errors import Error, MeshError
-from palpate.fields.principal import largest_magnitude
-from palpate.fields.stress import SurfaceStress
+from palpate.fields.stress import SurfaceStress, largest_magnitude
 from palpate.input_file import require_writable
 
 if TYPE_CHECKING:
     import meshio
+    from matplotlib.figure import Figure
 
 FORMATS = {".vtu": "vtu", ".vtk": "vtk"}
 ROWS, COLUMNS = np.array([0, 1, 2, 0, 1, 0]), np.array([0, 1, 2, 1, 2, 2])
 # meshio's name of a cell by its nodes.
 FACES, TETS = {3: "triangle", 6: "triangle6"}, {4: "tetra", 10: "tetra10"}
+# Triangles that are drawn within about a second.
+MOST_TRIANGLES = 40_000
 
 
 def volume_mesh(
@@ -136,3 +143,96 @@ def as_pyvista(mesh: meshio.Mesh) -> Any:
     except ImportError:
         raise Error("to_pyvista needs pyvista: pip install pyvista") from None
     return pyvista.from_meshio(mesh)
+
+
+class Exportable(ABC):
+    """One body or several, with files, meshes and pictures of them."""
+
+    @abstractmethod
+    def to_meshio(self) -> meshio.Mesh:
+        """Return the body at rest with displacement, strain and stress at its nodes, as a mesh of meshio."""
+
+    @abstractmethod
+    def _drawn_surfaces(self) -> list[DeformedSurface]:
+        """Surfaces of a picture."""
+
+    def to_pyvista(self) -> Any:
+        """Give the same as :meth:`to_meshio` as pyvista's unstructured grid.
+
+        Raises
+        ------
+        Error
+            pyvista is not installed.
+
+        """
+        return as_pyvista(self.to_meshio())
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write what :meth:`to_meshio` gives as .vtu or .vtk, for ParaView; replaced only when complete.
+
+        Raises
+        ------
+        MeshError
+            Another ending, or no place for a file.
+
+        """
+        write_result(self.to_meshio(), path)
+
+    def plot(self, magnification: float = 1.0) -> Figure:
+        """Draw the deformed body, coloured by displacement, as a figure of matplotlib; ``savefig`` writes it.
+
+        Parameters
+        ----------
+        magnification
+            Of the displacements that are drawn; the colours tell the true ones.
+
+        """
+        return draw(self._drawn_surfaces(), magnification, repr(self))
+
+    def _repr_html_(self) -> str:
+        return as_html(repr(self), self._drawn_surfaces())
+
+
+@dataclass(frozen=True)
+class DeformedSurface:
+    """A surface to be drawn."""
+
+    positions: np.ndarray  # (s, 3) m, at rest
+    triangles: np.ndarray  # (t, 3) rows of ``positions``, outward
+    displacements: np.ndarray  # (s, 3) m
+
+
+def draw(surfaces: Sequence[DeformedSurface], magnification: float, title: str) -> Figure:
+    """Deformed surfaces coloured by the size of the displacement, in mm."""
+    from matplotlib.figure import Figure
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    figure = Figure(figsize=(7, 5), layout="constrained")
+    axes = figure.add_subplot(projection="3d")
+    moved = [1e3 * np.linalg.norm(surface.displacements, axis=1) for surface in surfaces]
+    largest = max(float(values.max(initial=0.0)) for values in moved) or 1.0
+    ends = []
+    for surface, values in zip(surfaces, moved, strict=True):
+        places = 1e3 * (surface.positions + magnification * surface.displacements)
+        ends += [places.min(axis=0), places.max(axis=0)]
+        patches = Poly3DCollection(places[surface.triangles], cmap="viridis", linewidths=0)
+        patches.set_array(values[surface.triangles].mean(axis=1))
+        patches.set_clim(0.0, largest)
+        axes.add_collection3d(patches)
+    low, high = np.min(ends, axis=0), np.max(ends, axis=0)
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+    axes.set_box_aspect(np.maximum(high - low, 1e-3 * (high - low).max()))
+    axes.set(xlabel="x [mm]", ylabel="y [mm]", zlabel="z [mm]", title=title)
+    figure.colorbar(patches, ax=axes, label="displacement [mm]", shrink=0.7)
+    return figure
+
+
+def as_html(text: str, surfaces: Sequence[DeformedSurface]) -> str:
+    """Text of a result, and its picture where that is drawn within a moment, for notebooks."""
+    markup = f"<pre>{html.escape(text)}</pre>"
+    if sum(len(surface.triangles) for surface in surfaces) > MOST_TRIANGLES:
+        return markup
+    picture = io.BytesIO()
+    draw(surfaces, 1.0, "").savefig(picture, format="png", dpi=80)
+    encoded = base64.b64encode(picture.getvalue()).decode()
+    return f'{markup}<img alt="deformed surface" src="data:image/png;base64,{encoded}">'

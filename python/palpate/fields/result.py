@@ -7,12 +7,9 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from palpate.fields.export import surface_mesh, volume_mesh
-from palpate.fields.exported import Exportable
-from palpate.fields.picture import DeformedSurface
-from palpate.fields.strain_measure import StrainReporting, StrainSource
+from palpate.fields.export import DeformedSurface, Exportable, surface_mesh, volume_mesh
+from palpate.fields.strain_measure import StrainReporting, StrainSource, SurfaceStrain
 from palpate.fields.stress import StressRecovery
-from palpate.fields.surface_strain import SurfaceStrain
 
 if TYPE_CHECKING:
     import meshio

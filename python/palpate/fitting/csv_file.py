@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import csv
-import os
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -48,28 +47,23 @@ class _Column:
 
 
 def read_columns(
-    path: str | os.PathLike[str],
-    *,
-    force_unit: str | None = None,
-    depth_unit: str | None = None,
-    force_column: str | None = None,
-    depth_column: str | None = None,
+    path: Path, units: Mapping[str, str | None], titles: Mapping[str, str | None]
 ) -> tuple[dict[str, np.ndarray], list[str]]:
     """Return the columns of a CSV file in SI units, and the name of each row's place.
 
-    `Indentations.read` describes the file, the options and the errors.
+    ``units`` and ``titles`` of ``force`` and ``depth`` are those that stand instead of the header's, or None.
+    `Indentations.read` describes the file and the errors.
     """
-    path = Path(path)
     require_file(path, FitError)
     lines = _text(path).splitlines()
     parted, decimal = _separator(lines)
     table = [_cells(line, parted) for line in lines]
-    head, columns = _header(path, table, {"force": force_column, "depth": depth_column})
+    head, columns = _header(path, table, titles)
     first = head + 1
     if first < len(table) and _is_row_of_units(table[first]):
         columns = {k: c if c.unit else _with_unit(c, table[first]) for k, c in columns.items()}
         first += 1
-    scales = _scales(path, head, columns, {"force": force_unit, "depth": depth_unit})
+    scales = _scales(path, head, columns, units)
     values: dict[str, list[float]] = {name: [] for name in columns if name != "place"}
     places: list[str] = []
     for number, row in enumerate(table[first:], first):
@@ -166,7 +160,7 @@ def _is_row_of_units(row: Sequence[str]) -> bool:
 
 def _with_unit(column: _Column, units: Sequence[str]) -> _Column:
     unit = units[column.number].strip("()[]{} ") if column.number < len(units) else ""
-    return _Column(column.number, column.title, unit or None)
+    return replace(column, unit=unit or None)
 
 
 def _scales(path: Path, head: int, columns: Mapping[str, _Column], given: Mapping[str, str | None]) -> dict[str, float]:

@@ -121,9 +121,8 @@ class Indentations(ComparedByValue):
             No such file, columns or units that are not clear, or a cell that is no number, with its line.
 
         """
-        units = {"force_unit": force_unit, "depth_unit": depth_unit}
-        values, places = read_columns(path, **units, force_column=force_column, depth_column=depth_column)
-        return _assembled(Path(path), values, places)
+        units, titles = {"force": force_unit, "depth": depth_unit}, {"force": force_column, "depth": depth_column}
+        return _assembled(Path(path), *read_columns(Path(path), units, titles))
 
     def loading(self) -> Indentations:
         """Return the rows up to the largest depth of each curve, in the order of time."""

@@ -6,13 +6,14 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from palpate.atomic import written_beside
 from palpate.errors import FitError
+from palpate.figures import COLORS, empty_figure, write_figure
 from palpate.fitting.measurements import Indentations
-from palpate.fitting.picture import picture_of_fit
-from palpate.fitting.scene_file import write_fitted
 from palpate.fitting.statistics import Spread
 from palpate.fitting.unknowns import Slot, Unknown, Unknowns, as_numbers
 from palpate.input_file import require_writable
@@ -20,6 +21,8 @@ from palpate.scene import Scene
 
 # Larger correlations mean that two numbers change together.
 STRONGLY_CORRELATED = 0.95
+# More names than these are not written into the picture.
+MOST_NAMES = 8
 
 
 @dataclass(frozen=True)
@@ -229,3 +232,58 @@ def _quantity(name: str, value: float) -> str:
         pair for pair in ((1.0, "Pa"), (1e3, "kPa"), (1e6, "MPa")) if abs(value) < 1e3 * pair[0] or pair[0] == 1e6
     )
     return f"{value / scale:.4g} {unit}"
+
+
+def write_fitted(text: str, changes: Sequence[tuple[Slot, dict[str, float]]], path: Path) -> None:
+    """Write the text of a scene with other values of its materials, beside and renamed; comments and order stay."""
+    import tomlkit
+
+    document = tomlkit.parse(text)
+    for slot, values in changes:
+        table = _table_of(document, slot)
+        for name, value in values.items():
+            table[name] = round(value, 6) if name == "poissons_ratio" else _pressure(value)
+    with written_beside(path) as partial:
+        partial.write_text(tomlkit.dumps(document), encoding="utf-8")
+
+
+def _table_of(document: Any, slot: Slot) -> Any:
+    """Table of a slot: that of the body, if it has one, else that of the scene."""
+    import tomlkit
+
+    body = document.get("body", {})
+    body = body[0] if isinstance(body, list) else body
+    if slot.rank is not None:
+        return (body if slot.key in body else document)[slot.key][slot.rank]
+    if "material" in body:
+        return body["material"]
+    if "material" not in document:
+        document["material"] = tomlkit.table()
+    return document["material"]
+
+
+def _pressure(value: float) -> str:
+    return f"{value:.6g}Pa" if abs(value) < 1e3 else f"{1e-3 * value:.6g}kPa"
+
+
+def picture_of_fit(measured: Indentations, predicted: np.ndarray, used: np.ndarray, title: str, path: Path) -> None:
+    """Draw forces (n,), N, and whether rows (n,) were used, into a file."""
+    figure = empty_figure(6.4, 5.2)
+    curves, residuals = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
+    largest = np.abs(measured.force).max()
+    for k, name in enumerate(measured.names):
+        rows = np.flatnonzero(measured.curve == k)
+        rows = rows[np.argsort(measured.depth[rows])]
+        color, depth = COLORS[k % len(COLORS)], 1e3 * measured.depth[rows]
+        label = name if len(measured.names) <= MOST_NAMES else None
+        curves.plot(depth, measured.force[rows], ".", color=color, ms=4, label=label)
+        curves.plot(depth, predicted[rows], color=color, lw=1.4)
+        left = ~used[rows]
+        curves.plot(depth[left], measured.force[rows][left], "x", color="0.5", ms=5)
+        residuals.plot(depth, 100 * (measured.force - predicted)[rows] / largest, ".", color=color, ms=4)
+    residuals.axhline(0.0, color="0.4", lw=0.8)
+    curves.set(ylabel="force (N)", title=title)
+    curves.title.set_fontsize(9)
+    residuals.set(xlabel="depth (mm)", ylabel="residual (% of largest)")
+    curves.legend(frameon=False)
+    write_figure(figure, path, kind=path.suffix[1:].lower())

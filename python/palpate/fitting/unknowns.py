@@ -52,6 +52,11 @@ class Slot:
     table: MaterialTable | RegionTable | SegmentTable
     material: Material
 
+    @property
+    def name(self) -> str:
+        """Its key and place, such as ``region.0``."""
+        return self.key if self.rank is None else f"{self.key}.{self.rank}"
+
 
 class Unknowns:
     """Slots of a scene's first body, and what may be fitted of them."""
@@ -73,8 +78,7 @@ class Unknowns:
         found = [Unknown("material.youngs_modulus", first, -13.0, 34.0, 0.05, math.inf)]
         for slot in self.slots[1:]:
             ratio = math.log(slot.material.youngs_modulus) - first
-            name = f"{slot.key}.{slot.rank}.youngs_modulus"
-            found.append(Unknown(name, ratio, ratio - LOG_RANGE, ratio + LOG_RANGE, 0.05, 0.5))
+            found.append(Unknown(f"{slot.name}.youngs_modulus", ratio, ratio - LOG_RANGE, ratio + LOG_RANGE, 0.05, 0.5))
         return found
 
     def _poissons_ratio(self) -> Unknown:
@@ -90,9 +94,8 @@ class Unknowns:
             if slot.table.c10 is None:
                 continue
             for (name, (low, high)), value in zip(ratios.items(), slot.material.strain_law.parameters, strict=False):
-                key = "material" if slot.rank is None else f"{slot.key}.{slot.rank}"
                 width = high - low
-                found.append(Unknown(f"{key}.{name}", value, low, high, 0.05 * width, 0.25 * width))
+                found.append(Unknown(f"{slot.name}.{name}", value, low, high, 0.05 * width, 0.25 * width))
         return found
 
     def solution_key(self, numbers: Mapping[str, float]) -> tuple[float, ...]:
@@ -103,8 +106,7 @@ class Unknowns:
         """Values of keys of the scene, in SI units, in the order of its tables."""
         found: dict[str, float] = {}
         for rank, slot in enumerate(self.slots):
-            key = "material" if slot.rank is None else f"{slot.key}.{slot.rank}"
-            ratio = self._ratio_of(slot, numbers)
+            key, ratio = slot.name, self._ratio_of(slot, numbers)
             modulus = math.exp(numbers["material.youngs_modulus"])
             modulus *= math.exp(numbers[f"{key}.youngs_modulus"]) if rank else 1.0
             found[f"{key}.youngs_modulus"] = modulus
@@ -126,8 +128,8 @@ class Unknowns:
         """Keys of each slot's table with their values: a law's constants replace the modulus where they stand."""
         values, found = self.values(numbers), []
         for slot in self.slots:
-            key = "material" if slot.rank is None else f"{slot.key}.{slot.rank}"
-            own = {name.removeprefix(f"{key}."): v for name, v in values.items() if name.startswith(f"{key}.")}
+            prefix = f"{slot.name}."
+            own = {name.removeprefix(prefix): v for name, v in values.items() if name.startswith(prefix)}
             given = slot.table.youngs_modulus is not None and "youngs_modulus" in slot.table.model_fields_set
             if "c10" in own and not given:
                 own.pop("youngs_modulus")

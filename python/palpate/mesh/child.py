@@ -24,11 +24,7 @@ def run_limited(command: list[str], time_limit: float, watch: Callable[[], None]
     """
     # Its input stays open as long as this process lives: the child's end_with_parent watches it.
     process = subprocess.Popen(
-        command,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,
+        command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
     )
     try:
         deadline = time.monotonic() + time_limit

@@ -1,4 +1,4 @@
-"""Tetrahedra whose edges get a middle on a surface: curved ones of 10 nodes, or eight small ones for each."""
+"""Tetrahedra on a surface: its nodes put back on it, edges with a middle there, or eight small ones for each."""
 
 from __future__ import annotations
 
@@ -7,7 +7,15 @@ from collections.abc import Callable
 import numpy as np
 
 from palpate import _native
-from palpate.mesh.elements import AT_CORNERS, DIAGONALS, EDGES, INSIDE, corner_volumes, unique_edges
+from palpate.mesh.elements import (
+    AT_CORNERS,
+    DIAGONALS,
+    EDGES,
+    INSIDE,
+    corner_volumes,
+    smallest_dihedral_angles,
+    unique_edges,
+)
 from palpate.mesh.tetmesh import TetMesh
 
 # A curved element's least determinant in parts of its largest, in which straight ones have 1.
@@ -20,6 +28,12 @@ KEPT_SHAPE, GOOD_SHAPE = 0.7, 0.5
 
 
 Projection = Callable[[np.ndarray], np.ndarray]
+# Elements may become as flat as this, degrees; one that is flatter already keeps this part of its angle.
+LEAST_ANGLE, KEPT_ANGLE = 7.0, 0.85
+# A node in a bad element goes back by this factor; below this part of the mean edge it does not move.
+BACK, LEAST_MOVE = 0.7, 1e-3
+# Nodes that went back are tried again from where they are.
+ROUNDS = 3
 
 
 def curve(mesh: TetMesh, project: Projection, inner: tuple[np.ndarray, Projection] | None = None) -> TetMesh:
@@ -112,3 +126,30 @@ def _shapes(nodes: np.ndarray, tets: np.ndarray) -> np.ndarray:
     volumes = corner_volumes(nodes, tets)
     edges = corners[:, EDGES[:, 0]] - corners[:, EDGES[:, 1]]
     return np.sign(volumes) * 12 * np.cbrt(9 * volumes**2) / np.einsum("eij,eij->e", edges, edges)
+
+
+def snap(mesh: TetMesh, project: Callable[[np.ndarray], np.ndarray], moving: np.ndarray | None = None) -> TetMesh:
+    """4-node tetrahedra with their surface nodes on a shape, or as near as keeps every element's dihedral angles.
+
+    ``project`` takes points (p, 3), m, onto the shape; one that has no place there stays. The nodes ``moving`` (k,) are
+    moved; None: those on the surface.
+    """
+    nodes, tets, moving = mesh.nodes.copy(), mesh.tets, mesh.surface_nodes if moving is None else moving
+    least = LEAST_MOVE * np.linalg.norm(nodes[tets[:, 0]] - nodes[tets[:, 1]], axis=1).mean()
+    for _ in range(ROUNDS):
+        move = np.zeros_like(nodes)
+        move[moving] = project(nodes[moving]) - nodes[moving]
+        nodes += _allowed(nodes, tets, move, least)
+    return TetMesh(nodes, tets, mesh.regions, mesh.region_names)
+
+
+def _allowed(nodes: np.ndarray, tets: np.ndarray, move: np.ndarray, least: float) -> np.ndarray:
+    """Shorten moves (n, 3) where elements would become bad."""
+    touched = np.flatnonzero(move.any(axis=1)[tets].any(axis=1))
+    floor = np.minimum(LEAST_ANGLE, KEPT_ANGLE * smallest_dihedral_angles(nodes, tets[touched]))
+    while True:
+        bad = np.unique(tets[touched[smallest_dihedral_angles(nodes + move, tets[touched]) < floor]])
+        if not move[bad].any():
+            return move
+        shorter = np.linalg.norm(move[bad], axis=1) > least
+        move[bad] *= np.where(shorter, BACK, 0.0)[:, None]

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import permutations
+
 import numpy as np
 import scipy
 
@@ -81,6 +84,21 @@ def unique_edges(tets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     count = int(tets.max()) + 1
     keys, which = np.unique(ends[:, 0] * count + ends[:, 1], return_inverse=True)
     return np.stack([keys // count, keys % count], axis=1), which.reshape(-1, 6)
+
+
+def kuhn_tets(shape: Sequence[int]) -> np.ndarray:
+    """Six tetrahedra for each cell of a lattice of points (a, b, c), (6 cells, 4): paths along the axes (Kuhn 1960)."""
+    index = np.arange(np.prod(shape)).reshape(shape)
+    paths = []
+    for order in permutations(range(3)):
+        corner, path = np.zeros(3, dtype=int), []
+        for axis in (*order, None):
+            low = tuple(slice(c, s - 1 + c) for c, s in zip(corner, shape, strict=True))
+            path.append(index[low].ravel())
+            if axis is not None:
+                corner[axis] = 1
+        paths.append(np.column_stack(path))
+    return np.concatenate(paths)
 
 
 def _face_keys(corners: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Volume mesh files, by meshio; Netgen's own .vol by a reader of ours, for meshio cannot read today's."""
+"""Volume mesh files, by meshio; by readers of ours what it cannot read: Netgen's own .vol and Gmsh's first format."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import contextlib
 import io
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,7 +18,6 @@ from palpate.errors import MeshError, MeshWarning
 from palpate.input_file import require_file, require_writable
 from palpate.mesh.cells import CURVED, Block, shape_of, split
 from palpate.mesh.elements import boundary_faces
-from palpate.mesh.gmsh_first import is_first_format, read_first_format
 from palpate.mesh.size import scale_of
 from palpate.units import length_scale
 
@@ -44,6 +43,16 @@ LINEAR_ONLY = {".node", ".ele", ".mesh"}
 FROM_NETGEN = {4: [0, 2, 1, 3], 10: [0, 2, 1, 3, 5, 7, 4, 6, 9, 8]}
 FACE_FROM_NETGEN = {3: [0, 1, 2], 6: [0, 1, 2, 5, 3, 4]}
 REGION_NAMES = ("region", "gmsh:physical", "medit:ref")
+# Solid elements by Gmsh's number of their type: meshio's name, and its order of the nodes.
+SOLIDS = {
+    4: ("tetra", [0, 1, 2, 3]),
+    5: ("hexahedron", list(range(8))),
+    6: ("wedge", list(range(6))),
+    7: ("pyramid", list(range(5))),
+    11: ("tetra10", [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]),
+}
+# Points, lines and faces, which a solid does not need.
+LOWER = {1, 2, 3, 8, 9, 10, 15, 16}
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,11 +63,6 @@ class Volume:
     tets: np.ndarray  # (m, 4) or (m, 10) node indices
     regions: np.ndarray  # (m,) integer labels
     region_names: Mapping[str, int]  # labels by name
-
-    @property
-    def is_quadratic(self) -> bool:
-        """Whether elements have 10 nodes."""
-        return self.tets.shape[1] == 10
 
 
 def read_volume(path: Path, unit: str | None) -> Volume:
@@ -78,8 +82,8 @@ def _read_meshio(path: Path) -> meshio.Mesh:
 
     if path.suffix not in WRITERS:
         raise MeshError(f"{path}: unknown volume format '{path.suffix}'; known are {', '.join(WRITERS)}")
-    if path.suffix == ".msh" and is_first_format(path):
-        return read_first_format(path)
+    if path.suffix == ".msh" and _is_first_format(path):
+        return _read_first_format(path)
     # meshio prints its complaints and may end the program; both become one error of ours.
     noise = io.StringIO()
     try:
@@ -201,7 +205,7 @@ def _read_netgen(path: Path) -> Volume:
     if len(heads) != 2:
         raise MeshError(f"{path}: holds no points and volume elements of a Netgen mesh")
     try:
-        elements = _section(lines, heads["volumeelements"])
+        elements = _netgen_section(lines, heads["volumeelements"])
         counts = np.array([int(e[1]) for e in elements])
         others = np.flatnonzero(~np.isin(counts, list(FROM_NETGEN)))
         if others.size:
@@ -209,7 +213,7 @@ def _read_netgen(path: Path) -> Volume:
         if len(np.unique(counts)) > 1:
             raise MeshError(f"{path}: mixes 4-node and 10-node tetrahedra")
         count = int(counts[0])
-        nodes = np.array([[float(v) for v in row[:3]] for row in _section(lines, heads["points"])])
+        nodes = np.array([[float(v) for v in row[:3]] for row in _netgen_section(lines, heads["points"])])
         tets = np.array([[int(v) - 1 for v in e[2 : 2 + count]] for e in elements])
         regions = np.array([int(e[0]) for e in elements])
     except (ValueError, IndexError) as error:
@@ -217,7 +221,7 @@ def _read_netgen(path: Path) -> Volume:
     return Volume(nodes.reshape(-1, 3), tets[:, FROM_NETGEN[count]], regions, {})
 
 
-def _section(lines: list[str], head: int) -> list[list[str]]:
+def _netgen_section(lines: list[str], head: int) -> list[list[str]]:
     count = int(lines[head + 1])
     rows = [line.split() for line in lines[head + 2 : head + 2 + count]]
     if len(rows) < count:
@@ -232,7 +236,8 @@ def write_volume(mesh: Volume, path: Path, unit: str) -> None:
     if path.suffix not in WRITERS:
         raise MeshError(f"{path}: unknown volume format '{path.suffix}'; known are {', '.join(WRITERS)}")
     require_writable(path, MeshError)
-    if mesh.is_quadratic and path.suffix in LINEAR_ONLY:
+    is_quadratic = mesh.tets.shape[1] == 10
+    if is_quadratic and path.suffix in LINEAR_ONLY:
         known = ", ".join(ending for ending in WRITERS if ending not in LINEAR_ONLY)
         raise MeshError(f"{path}: 10-node tetrahedra cannot be written to {path.suffix} files; use {known}")
     name = {".msh": "gmsh:physical", ".mesh": "medit:ref"}.get(path.suffix, "region")
@@ -243,25 +248,21 @@ def write_volume(mesh: Volume, path: Path, unit: str) -> None:
         data = {}
     points = mesh.nodes / length_scale(unit)
     names = {name: np.array([number, 3]) for name, number in mesh.region_names.items()} if path.suffix == ".msh" else {}
-    cells = [("tetra10" if mesh.is_quadratic else "tetra", mesh.tets)]
+    cells = [("tetra10" if is_quadratic else "tetra", mesh.tets)]
     content = meshio.Mesh(points, cells, cell_data=data, field_data=names)
-    if path.suffix == ".vol":
-        _replace(path, lambda partial: _write_netgen(partial, points, mesh))
-        return
     options = {"binary": True} if path.suffix == ".msh" else {}
     noise = io.StringIO()
     with contextlib.redirect_stdout(noise), contextlib.redirect_stderr(noise):
         if WRITERS[path.suffix] == "tetgen":
             _write_tetgen(content, path)
-        elif path.suffix == ".inp":
-            _replace(path, lambda partial: _write_abaqus(partial, content))
-        else:
-            _replace(path, lambda partial: meshio.write(partial, content, WRITERS[path.suffix], **options))
-
-
-def _replace(path: Path, write: Callable[[Path], None]) -> None:
-    with written_beside(path) as partial:
-        write(partial)
+            return
+        with written_beside(path) as partial:
+            if path.suffix == ".vol":
+                _write_netgen(partial, points, mesh)
+            elif path.suffix == ".inp":
+                _write_abaqus(partial, content)
+            else:
+                meshio.write(partial, content, WRITERS[path.suffix], **options)
 
 
 def _write_tetgen(content: meshio.Mesh, path: Path) -> None:
@@ -298,3 +299,50 @@ def _write_netgen(path: Path, points: np.ndarray, mesh: Volume) -> None:
         file.write(f"\npoints\n{len(points)}\n")
         file.writelines(f"{x!r} {y!r} {z!r}\n" for x, y, z in points.tolist())
         file.write("\nendmesh\n")
+
+
+def _is_first_format(path: Path) -> bool:
+    """Whether a file begins as one of Gmsh's first format (`$NOD`, `$ELM`), which older programs still write."""
+    with path.open("rb") as file:
+        return file.read(256).lstrip().startswith(b"$NOD")
+
+
+def _read_first_format(path: Path) -> meshio.Mesh:
+    """Read nodes and solid elements; the physical number of an element is its region.
+
+    Raises MeshError for a file that is cut short or has elements of another kind, with the line.
+    """
+    import meshio
+
+    lines = enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), 1)
+    try:
+        nodes = [(int(words[0]), [float(x) for x in words[1:4]]) for words in _gmsh_section(lines, "$NOD")]
+        rank = {number: row for row, (number, _) in enumerate(nodes)}
+        cells: dict[str, list[list[int]]] = {}
+        regions: dict[str, list[int]] = {}
+        for words in _gmsh_section(lines, "$ELM"):
+            kind, region, of_element = int(words[1]), int(words[2]), [rank[int(word)] for word in words[5:]]
+            if kind in LOWER:
+                continue
+            if kind not in SOLIDS:
+                raise MeshError(f"{path}: elements of Gmsh's type {kind} are not read: save 4- or 10-node tetrahedra")
+            name, order = SOLIDS[kind]
+            cells.setdefault(name, []).append([of_element[node] for node in order])
+            regions.setdefault(name, []).append(region)
+    except (ValueError, KeyError, IndexError):
+        number = next(lines, (None, ""))[0]
+        where = f":{number - 1}" if number else ""
+        raise MeshError(f"{path}{where}: is no whole file of Gmsh's first format") from None
+    points = np.array([place for _, place in nodes], dtype=float).reshape(-1, 3)
+    blocks = [(name, np.array(rows)) for name, rows in cells.items()]
+    return meshio.Mesh(points, blocks, cell_data={"gmsh:physical": [np.array(regions[name]) for name in cells]})
+
+
+def _gmsh_section(lines: Iterator[tuple[int, str]], name: str) -> Iterator[list[str]]:
+    """Words of the lines of a section, of which there must be as many as it says."""
+    for _, line in lines:
+        if line.strip() == name:
+            break
+    count = int(next(lines, (0, ""))[1])
+    for _ in range(count):
+        yield next(lines, (0, ""))[1].split()

@@ -19,14 +19,14 @@ from typing import Any
 import numpy as np
 
 from palpate._native import end_with_parent
-from palpate.errors import Error, MeshError, UnclearUnitError
+from palpate.errors import Error, MeshError
 from palpate.mesh.files import WRITERS
 from palpate.mesh.fill_job import FillOptions
-from palpate.mesh.size import COMMON_UNITS, scale_of
+from palpate.mesh.size import COMMON_UNITS, units_of_size
 from palpate.mesh.surface_file import SURFACE_ENDINGS, load_surface
 from palpate.mesh.tetmesh import TetMesh
 from palpate.mesh.tetrahedralize import STAGES, tetrahedralize_with
-from palpate.segmentation.default_segments import default_segments, selectors
+from palpate.segmentation.boundaries import default_segments, selectors
 from palpate.segmentation.endings import SEGMENTATION_ENDINGS, is_segmentation
 from palpate.segmentation.reading import load_label_map
 from palpate.units import length_scale
@@ -74,8 +74,7 @@ def _read(path: Path, unit: str | None, say: Callable[..., None]) -> TetMesh:
         used = _unit(path, points, unit, say)
         np.savez(SURFACE, vertices=points, faces=np.asarray(loaded.shape.faces))
         say(stage="checking", done=1, total=len(STAGES), drawn=True)
-        progress = _StageLines(say)
-        return tetrahedralize_with("quadratic", loaded, unit=used, progress=progress)
+        return tetrahedralize_with("quadratic", loaded, unit=used, progress=_stage_lines(say))
     if ending in WRITERS:
         mesh = TetMesh.read(path, "m")
         used = _unit(path, mesh.nodes, unit, say)
@@ -104,29 +103,25 @@ def _segments(path: Path, unit: str | None, say: Callable[..., None]) -> TetMesh
         say(stage=STAGES[1], done=1, total=len(STAGES), drawn=True)
 
     options = FillOptions(segments=tuple(names))
-    return tetrahedralize_with("quadratic", path, unit=unit, options=options, progress=_StageLines(say), drawn=drawn)
+    return tetrahedralize_with("quadratic", path, unit=unit, options=options, progress=_stage_lines(say), drawn=drawn)
 
 
-class _StageLines:
-    """Reports the stages of filling by their rank."""
+def _stage_lines(say: Callable[..., None]) -> Callable[[int, int], None]:
+    """Report each stage of filling once, by its rank."""
+    last = 1
 
-    def __init__(self, say: Callable[..., None]):
-        self._say, self._last = say, 1
+    def report(done: int, total: int) -> None:
+        nonlocal last
+        if done > last:
+            last = done
+            say(stage=STAGES[done], done=done, total=total)
 
-    def __call__(self, done: int, total: int) -> None:
-        if done > self._last:
-            self._last = done
-            self._say(stage=STAGES[done], done=done, total=total)
+    return report
 
 
 def _unit(path: Path, points: np.ndarray, unit: str | None, say: Callable[..., None]) -> str:
     """Report the sides of the body in the file's unit, and the units that it may be in; take the likeliest."""
-    fitting = ["m"]
-    if path.suffix.lower() not in IN_METRES:
-        try:
-            scale_of(str(path), points, None)
-        except UnclearUnitError as error:
-            fitting = list(error.fitting) or list(COMMON_UNITS)
+    fitting = ["m"] if path.suffix.lower() in IN_METRES else units_of_size(points) or list(COMMON_UNITS)
     used = unit or fitting[0]
     sides = np.ptp(points, axis=0) if len(points) else np.zeros(3)
     say(read=True, sides=sides.tolist(), fitting=fitting, unit=used)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -89,7 +89,7 @@ class FillProcess:
         if "drawn" in line and self._read is not None:
             with np.load(self.folder / SURFACE) as arrays:
                 vertices, faces = arrays["vertices"] * length_scale(self._read.unit), arrays["faces"]
-            self._read = ReadFile(**{**vars(self._read), "vertices": vertices, "faces": faces})
+            self._read = replace(self._read, vertices=vertices, faces=faces)
             self.on_read(self._read)
         if "filled" in line:
             self._names = {str(name): int(label) for name, label in line["names"].items()}

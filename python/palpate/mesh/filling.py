@@ -15,9 +15,8 @@ import numpy as np
 from palpate.errors import MeshError, MeshWarning
 from palpate.mesh.child import FILES_FAILED, OUT_OF_PROCESSOR_TIME, failure_of, run_limited
 from palpate.mesh.curve import curve, refine
-from palpate.mesh.element_count import IN_CUBE
-from palpate.mesh.fill_job import PARTS, FillJob, length_text
-from palpate.mesh.fit import GOOD_LOSS, Fit, mean_edge
+from palpate.mesh.fill_job import IN_CUBE, FillJob, length_text
+from palpate.mesh.fit import GOOD_LOSS, Fit, change_text, mean_edge
 from palpate.mesh.surface_state import SurfaceState
 from palpate.mesh.tetmesh import TetMesh
 from palpate.mesh.triangles import closest_on
@@ -70,7 +69,7 @@ class Filling:
 
     def mesh(self) -> TetMesh:
         """Fill the surface; MeshError for a mesher that failed, or a mesh that loses a part of the body, and why."""
-        size = self.extent / PARTS[self.job.element] if self.job.size is None else self.job.size
+        size = self.job.size_in(self.extent)
         halvings = self._halvings(size)
         found: tuple[TetMesh, Fit] | None = None
         points, local = np.empty((0, 3)), np.empty(0)
@@ -78,7 +77,7 @@ class Filling:
         deadline = time.monotonic() + patience
         for _ in range(ATTEMPTS if self.job.size is None else ATTEMPTS_GIVEN):
             # Where a size is given, parts that NETGEN's larger elements miss are got back by smaller ones there.
-            least = size / 2**halvings if self.job.size is not None else self.extent / PARTS[self.job.element] / FINEST
+            least = size / 2**halvings if self.job.size is not None else self.job.size_in(self.extent) / FINEST
             attempt = self._tetrahedra((size, halvings), points, local, deadline)
             fit = Fit.of(attempt, self.shape) if isinstance(attempt, TetMesh) else None
             if fit is not None and (found is None or abs(fit.loss) < abs(found[1].loss)):
@@ -110,8 +109,7 @@ class Filling:
         if fit.is_good(size):
             return
         what = "the mesh" if self.job.size is None else f"with elements of {length_text(size)} the mesh"
-        change = f"{'loses' if fit.loss > 0 else 'adds'} {100 * abs(fit.loss):.1f} % of the volume"
-        message = f"{self.name}: {what} {change} and lies up to {length_text(fit.gaps.max())} off the surface"
+        message = f"{self.name}: {what} {change_text(fit.loss, fit.gaps.max())}"
         smaller = f"elements of {length_text(fit.size_for_good(min(size, mean_edge(mesh))))} (--max-size) should do"
         if abs(fit.loss) > VOLUME_TOLERANCE:
             raise MeshError(f"{message}; {self._crossing or f'they are too large for it, {smaller}'}")
@@ -147,9 +145,7 @@ class Filling:
             "faces": self.shape.faces,
             "size": size / unit,
             "processor_limit": self.processor_limit or 0.0,
-            "balls": np.reshape(
-                [[*((np.array(c) - origin) / extent), r / extent, h / unit] for c, r, h in self.job.refine], (-1, 5)
-            ),
+            "balls": self.job.balls(origin, extent, unit),
             "points": np.column_stack([(points[smaller] - origin) / extent, local[smaller] / unit]),
         }
         result = self._run(job, deadline)

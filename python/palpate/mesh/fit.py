@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from palpate.mesh.fill_job import length_text
 from palpate.mesh.tetmesh import TetMesh
 from palpate.mesh.triangles import closest_on
 
@@ -66,6 +67,12 @@ class Fit:
     def size_for_good(self, size: float) -> float:
         """Size of all elements at which the loss should be small."""
         return MARGIN * size * min(1.0, GOOD_LOSS / max(abs(self.loss), GOOD_LOSS)) ** (1.0 / self.order)
+
+
+def change_text(loss: float, gap: float) -> str:
+    """Say how a mesh differs from its surface: by a share of the volume, and by a distance, m, at most."""
+    change = f"{'loses' if loss > 0 else 'adds'} {100 * abs(loss):.1f} % of the volume"
+    return f"{change} and lies up to {length_text(gap)} off the surface"
 
 
 def distances(mesh: TetMesh, points: np.ndarray) -> np.ndarray:

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.errors import MeshError
+from palpate.mesh.curve import snap
 from palpate.mesh.elements import FACES
-from palpate.mesh.snap import snap
 from palpate.mesh.tetmesh import TetMesh
 from palpate.mesh.triangles import closest_on
 

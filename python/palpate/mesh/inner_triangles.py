@@ -8,7 +8,9 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Sequence
 
+import igl
 import numpy as np
+from manifold3d import Error, Manifold, Mesh
 
 Triangles = tuple[np.ndarray, np.ndarray]
 
@@ -23,8 +25,6 @@ def inner_triangles(
     vertices: np.ndarray, faces: np.ndarray, inner: Sequence[tuple[np.ndarray, np.ndarray, float]]
 ) -> Triangles | None:
     """Triangles (n, 3), (k, 3) of inner boundaries, each with the size of its elements; None where none is left."""
-    import igl
-
     shells: list[Triangles] = []
     for own_vertices, own_faces, size in reversed(inner):
         points, triangles = np.ascontiguousarray(own_vertices), np.ascontiguousarray(own_faces, dtype=np.int64)
@@ -48,8 +48,6 @@ def inner_triangles(
 
 def within_surface(points: np.ndarray, vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """Whether points (k, 3) lie within closed triangles, by their winding number."""
-    import igl
-
     winding = igl.fast_winding_number(
         np.ascontiguousarray(vertices), np.ascontiguousarray(faces, dtype=np.int64), np.ascontiguousarray(points)
     )
@@ -58,8 +56,6 @@ def within_surface(points: np.ndarray, vertices: np.ndarray, faces: np.ndarray) 
 
 def simplified(vertices: np.ndarray, faces: np.ndarray, moved: float) -> Triangles:
     """Fewer triangles that lie at most this far off; ValueError for triangles that bound no manifold, and why."""
-    from manifold3d import Error, Manifold, Mesh
-
     solid = Manifold(Mesh(np.asarray(vertices, dtype=np.float32), np.asarray(faces, dtype=np.uint32)))
     if solid.status() != Error.NoError:
         raise ValueError(str(solid.status()))

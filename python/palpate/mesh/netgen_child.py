@@ -10,16 +10,14 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+from netgen.meshing import Element2D, FaceDescriptor, Mesh, MeshingParameters, MeshPoint, Pnt
+from netgen.stl import STLGeometry
 
 from palpate._native import end_with_parent
 from palpate.mesh.child import FILES_FAILED
 from palpate.mesh.triangles import area_vectors, units
-
-if TYPE_CHECKING:
-    from netgen.meshing import Mesh, MeshingParameters
 
 # Edges sharper than this angle are kept as edges, degrees. NETGEN's default of 30 invents edges on smooth organs.
 FEATURE_ANGLE = 80.0
@@ -27,8 +25,6 @@ FEATURE_ANGLE = 80.0
 
 def main(route: str, surface_file: str, mesh_file: str) -> int:
     """Mesh the triangles of ``given`` into ``made``."""
-    from netgen.meshing import MeshingParameters
-
     with np.load(surface_file) as job:
         vertices, faces, size = job["vertices"], job["faces"], float(job["size"])
         _limit_processor_time(float(job["processor_limit"]))
@@ -69,15 +65,11 @@ def _write_sizes(path: Path, points: np.ndarray) -> None:
 
 
 def _remesh(corners: np.ndarray, surface: Path, parameters: MeshingParameters) -> Mesh:
-    from netgen.stl import STLGeometry
-
     _write_stl(surface, corners)
     return STLGeometry(str(surface)).GenerateMesh(mp=parameters)
 
 
 def _fill(vertices: np.ndarray, faces: np.ndarray, parameters: MeshingParameters) -> Mesh:
-    from netgen.meshing import Element2D, FaceDescriptor, Mesh, MeshPoint, Pnt
-
     mesh = Mesh()
     points = [mesh.Add(MeshPoint(Pnt(*vertex))) for vertex in vertices.tolist()]
     face = mesh.Add(FaceDescriptor(bc=1, domin=1, surfnr=1))

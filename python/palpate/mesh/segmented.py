@@ -11,8 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from palpate.errors import MeshError, MeshWarning
-from palpate.mesh.element_count import require_fitting_size
-from palpate.mesh.fill_job import PARTS, Ball, Element, FillJob
+from palpate.mesh.fill_job import Ball, Element, FillJob, require_fitting_size
 from palpate.mesh.inner import InnerRegion, InnerRegions
 from palpate.mesh.label_process import label_arrays
 from palpate.mesh.surface_file import SurfaceFile
@@ -44,8 +43,7 @@ def segmented(path: str | os.PathLike[str], unit: str | None, job: FillJob, draw
         drawn(found["vertices"], found["faces"])
     shape = trimesh.Trimesh(found["vertices"], found["faces"], process=False)
     require_fitting_size(name, shape, job)
-    longest = float(np.ptp(found["vertices"], axis=0).max())
-    size = longest / PARTS[job.element] if job.size is None else job.size
+    size = job.size_in(float(np.ptp(found["vertices"], axis=0).max()))
     inner, balls = _inner(found, job.element, size)
     _note_boundaries(name, found)
     job = replace(job, size=size, refine=[*job.refine, *balls])

@@ -23,6 +23,21 @@ def size_text(extents: Sequence[float] | np.ndarray) -> str:
     return f"{' x '.join(f'{side / LENGTH_UNITS[unit]:.4g}' for side in extents)} {unit}"
 
 
+def units_of_size(positions: np.ndarray) -> list[str]:
+    """Units of length that positions (k, 3) of a file may be in, most common first: metres alone where these fit.
+
+    None where the body is of no likely size in any unit.
+    """
+    extents = np.ptp(positions, axis=0) if len(positions) else np.zeros(3)
+    return ["m"] if _is_likely(extents) else [u for u in COMMON_UNITS if _is_likely(LENGTH_UNITS[u] * extents)]
+
+
+def _is_likely(extents: np.ndarray) -> bool:
+    """Whether sides, m, are those of a body that is felt; what has no size, or none that is finite, is not judged."""
+    longest = float(extents.max())
+    return not np.isfinite(longest) or longest <= 0 or LEAST_SIZE <= longest <= MOST_SIZE
+
+
 def scale_of(name: str, positions: np.ndarray, unit: str | None) -> float:
     """Metres in the unit of length of a file, which is metres if none is given; ``positions`` (k, 3) are in its unit.
 
@@ -31,14 +46,13 @@ def scale_of(name: str, positions: np.ndarray, unit: str | None) -> float:
     """
     scale = length_scale("m" if unit is None else unit)
     extents = np.ptp(positions, axis=0) if len(positions) else np.zeros(3)
-    longest = float(extents.max())
-    if not np.isfinite(longest) or longest <= 0 or LEAST_SIZE <= scale * longest <= MOST_SIZE:
+    if _is_likely(scale * extents):
         return scale
     size = size_text(scale * extents)
-    fitting = [u for u in COMMON_UNITS if LEAST_SIZE <= LENGTH_UNITS[u] * longest <= MOST_SIZE]
     if unit is not None:
         warnings.warn(f"{name}: the body is {size}; is its unit of length really {unit}?", MeshWarning, stacklevel=4)
         return scale
+    fitting = units_of_size(positions)
     choices = " or ".join(f"{u} ({size_text(LENGTH_UNITS[u] * extents)})" for u in fitting) or "any"
     example = fitting[0] if fitting else "m"
     raise UnclearUnitError(

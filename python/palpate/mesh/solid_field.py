@@ -10,7 +10,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import igl
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from palpate.mesh.triangles import area_vectors, areas, units
 
@@ -68,8 +71,6 @@ def _thinned(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 def oriented(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """Turn triangles so that neighbours agree with most of the area of each patch, and inverted parts round."""
-    import igl
-
     directed = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2) @ [1, len(vertices)]
     agreeing, patch = np.unique(directed).size == directed.size, np.zeros(len(faces), dtype=np.int64)
     turned = faces
@@ -86,10 +87,6 @@ def oriented(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 def _outward(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """Turn parts of negative volume round, unless they bound a cavity of another part."""
-    import igl
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     a, b = faces[:, :2].T, faces[:, 1:].T
     links = coo_array((np.ones(2 * len(faces)), (np.concatenate(a), np.concatenate(b))), shape=(len(vertices),) * 2)
     part = connected_components(links, directed=False)[1][faces[:, 0]]

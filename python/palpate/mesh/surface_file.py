@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
-import logging
+import functools
 import os
-import warnings
-from collections.abc import Callable, Iterator
+import re
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,15 +13,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.errors import MeshError
-from palpate.input_file import require_file
-from palpate.mesh.cut_short import require_whole
-from palpate.mesh.ply import has_strips, read_ply
-from palpate.mesh.stl import load_stl, read_stl
+from palpate.input_file import quiet, reason_text, require_file
+from palpate.mesh.own_readers import has_strips, load_stl, read_ply, read_stl
 
 if TYPE_CHECKING:
     import trimesh
 
 SURFACE_ENDINGS = (".stl", ".obj", ".ply", ".off", ".glb", ".gltf")
+# What every writer ends an STL text with; some write "end solid".
+_END_OF_STL = re.compile(rb"\bend[ \t]*solid\b", re.IGNORECASE)
+# A header of PLY, or the first line of OFF that is no comment, is shorter than this.
+HEAD, TAIL = 4096, 4096
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,10 +57,10 @@ def load_surface(surface: str | os.PathLike[str] | trimesh.Trimesh | SurfaceFile
     reasons = []
     for read in _readers(path):
         try:
-            with _silence():
+            with quiet("trimesh"):
                 found = read(path)
         except Exception as error:
-            reasons.append(" ".join(str(error).split())[:150] or type(error).__name__)
+            reasons.append(reason_text(error))
             continue
         if len(found.shape.faces) > 0:
             require_whole(path, len(found.shape.faces))
@@ -69,43 +70,23 @@ def load_surface(surface: str | os.PathLike[str] | trimesh.Trimesh | SurfaceFile
     raise MeshError(f"{path}: holds no triangles; is it really a file in {path.suffix[1:].upper()} format?")
 
 
-@contextlib.contextmanager
-def _silence() -> Iterator[None]:
-    """Keep a library's warnings, and its log with tracebacks of what it got over, from the terminal."""
-    log = logging.getLogger("trimesh")
-    level = log.level
-    log.setLevel(logging.CRITICAL)
-    try:
-        with warnings.catch_warnings(), np.errstate(all="ignore"):
-            warnings.simplefilter("ignore")
-            yield
-    finally:
-        log.setLevel(level)
-
-
 def _readers(path: Path) -> list[Callable[[Path], SurfaceFile]]:
     """Ways to read a file, the first that finds triangles is taken."""
     ending = path.suffix.lower()
     if ending == ".stl":
         return [lambda path: _of_scene(path, load_stl(path)), lambda path: _of_arrays(path, *read_stl(path))]
-    plain = [_by_trimesh, _without_materials]
+    # Textures or materials may be missing or damaged.
+    plain = [_by_trimesh, functools.partial(_by_trimesh, skip_materials=True)]
     if ending == ".ply":
         own = lambda path: _of_arrays(path, *read_ply(path))  # noqa: E731
         return [own] if has_strips(path) else [*plain, own]
     return plain
 
 
-def _by_trimesh(path: Path) -> SurfaceFile:
+def _by_trimesh(path: Path, **options: bool) -> SurfaceFile:
     import trimesh
 
-    return _of_scene(path, trimesh.load_scene(path, process=False))
-
-
-def _without_materials(path: Path) -> SurfaceFile:
-    """Read a file whose textures or materials are missing or damaged."""
-    import trimesh
-
-    return _of_scene(path, trimesh.load_scene(path, process=False, skip_materials=True))
+    return _of_scene(path, trimesh.load_scene(path, process=False, **options))
 
 
 def _of_arrays(path: Path, vertices: np.ndarray, faces: np.ndarray) -> SurfaceFile:
@@ -138,3 +119,36 @@ def _of_scene(path: Path, loaded: trimesh.Trimesh | trimesh.Scene) -> SurfaceFil
         first += len(mesh.vertices)
     shape = trimesh.Trimesh(np.concatenate(points), np.concatenate(faces), process=False)
     return SurfaceFile(str(path), shape, tuple(name for name, *_ in placed), np.concatenate(of_face))
+
+
+def require_whole(path: Path, triangles: int) -> None:
+    """Raise MeshError for a file with fewer faces than its header counts, or an STL text without its end.
+
+    An interrupted copy or a full disk leaves such files.
+    Polygons are cut into triangles, so that a whole file has at least as many ``triangles``, which were read, as faces.
+    Binary files are refused by their readers.
+    """
+    with path.open("rb") as file:
+        head = file.read(HEAD)
+        file.seek(-min(TAIL, path.stat().st_size), 2)
+        tail = file.read()
+    faces = _declared_faces(path.suffix.lower(), head)
+    if triangles < faces:
+        raise MeshError(f"{path}: it is cut short: its header counts {faces} faces, {triangles} are there")
+    is_text = head[:5].lower() == b"solid" and b"\0" not in head
+    if path.suffix.lower() == ".stl" and is_text and not _END_OF_STL.search(tail):
+        raise MeshError(
+            f"{path}: it is cut short: 'endsolid' is missing after {triangles} triangles; copy it again, or add that "
+            "line if it is whole"
+        )
+
+
+def _declared_faces(ending: str, head: bytes) -> int:
+    """Return how many faces a header of PLY or OFF counts, 0 where there is none."""
+    if ending == ".ply":
+        found = re.search(rb"^element[ \t]+face[ \t]+(\d+)", head, re.MULTILINE)
+        return int(found.group(1)) if found else 0
+    if ending == ".off":
+        words = re.sub(rb"#[^\n]*", b"", head).split()
+        return int(words[2]) if len(words) > 2 and words[0].upper().endswith(b"OFF") and words[2].isdigit() else 0
+    return 0

@@ -80,14 +80,10 @@ class TetMesh:
             raise MeshError(f"regions must have shape ({len(tets)},), got {regions.shape}")
         _check_indices(nodes, tets)
         nodes, tets = _drop_orphans(nodes, tets)
-        self.nodes = nodes
-        self.tets = _orient(nodes, tets)
-        self.regions = regions
+        self.nodes, self.tets, self.regions = map(_read_only, (nodes, _orient(nodes, tets), regions))
         if not isinstance(region_names, Mapping | None):
             raise MeshError(f"region_names must map names to labels, got {brief_repr(region_names)}")
         self.region_names = dict(region_names or {})
-        for array in (self.nodes, self.tets, self.regions):
-            array.setflags(write=False)
 
     def __repr__(self) -> str:
         order = "10-node " if self.is_quadratic else ""
@@ -114,23 +110,17 @@ class TetMesh:
     @cached_property
     def surface_faces(self) -> np.ndarray:
         """Elements' faces on the boundary, outward: (k, 3), or (k, 6) with the middles of the edges 01, 12, 20."""
-        boundary = boundary_faces(self.tets)
-        boundary.setflags(write=False)
-        return boundary
+        return _read_only(boundary_faces(self.tets))
 
     @cached_property
     def surface_triangles(self) -> np.ndarray:
         """Boundary triangles, (k, 3) node indices, outward; four for a face with mid-side nodes."""
-        triangles = drawing_triangles(self.surface_faces)
-        triangles.setflags(write=False)
-        return triangles
+        return _read_only(drawing_triangles(self.surface_faces))
 
     @cached_property
     def surface_nodes(self) -> np.ndarray:
         """Nodes on the boundary, ascending (s,)."""
-        nodes = np.unique(self.surface_triangles)
-        nodes.setflags(write=False)
-        return nodes
+        return _read_only(np.unique(self.surface_triangles))
 
     @cached_property
     def volumes(self) -> np.ndarray:
@@ -219,6 +209,11 @@ class TetMesh:
     def write(self, path: str | os.PathLike[str], unit: str = "m") -> None:
         """Write the mesh and its regions in the format of the file's ending; replaced only when complete."""
         write_volume(Volume(self.nodes, self.tets, self.regions, self.region_names), Path(path), unit)
+
+
+def _read_only(array: np.ndarray) -> np.ndarray:
+    array.setflags(write=False)
+    return array
 
 
 def _region_array(regions: np.ndarray | None, count: int) -> np.ndarray:

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.errors import MeshError
-from palpate.mesh.element_count import require_fitting_size
-from palpate.mesh.fill_job import Ball, Element, FillJob, FillOptions, Mesher, Which
+from palpate.mesh.fill_job import Ball, Element, FillJob, FillOptions, Mesher, Which, require_fitting_size
 from palpate.mesh.filling import Filling, MesherFailedError
 from palpate.mesh.segmented import Draw, segmented
 from palpate.mesh.size import scale_of

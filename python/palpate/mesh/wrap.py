@@ -7,7 +7,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import igl
 import numpy as np
+from scipy import ndimage
+from skimage.measure import marching_cubes
 
 from palpate.mesh.inner_triangles import simplified
 from palpate.mesh.solid_field import Grid, SolidField
@@ -126,8 +129,6 @@ def _closed_share(field: SolidField, vertices: np.ndarray, faces: np.ndarray, ce
 
 def _parts(grid: Grid, field: SolidField, labels: np.ndarray) -> tuple[np.ndarray, list[Part], float]:
     """Return the number of the part of each point, 0 outside and in crumbs; the parts; and the volume of the crumbs."""
-    from scipy import ndimage
-
     found, count = ndimage.label(grid.values < 0)
     if count == 0:
         raise WrapError("it encloses nothing: its triangles have no inside")
@@ -146,14 +147,8 @@ def _parts(grid: Grid, field: SolidField, labels: np.ndarray) -> tuple[np.ndarra
     for rank, box in enumerate(ndimage.find_objects(number[found]), 1):
         low, high = (grid.origin + grid.cell * np.array([getattr(s, end) for s in box]) for end in ("start", "stop"))
         names = np.bincount(labels[(of_face == rank) & (labels >= 0)])
-        parts.append(
-            Part(
-                volumes[order[rank - 1]],
-                0.5 * (low + high - grid.cell),
-                high - low,
-                int(names.argmax()) if names.size else -1,
-            )
-        )
+        own = int(names.argmax()) if names.size else -1
+        parts.append(Part(volumes[order[rank - 1]], 0.5 * (low + high - grid.cell), high - low, own))
     return number[found], parts, float(volumes.sum() - volumes[order].sum())
 
 
@@ -169,24 +164,16 @@ def _around(
     fine, _ = field.on_grid(grid.origin + (low - 1) * grid.cell, grid.origin + high * grid.cell, extent / cells)
     points = np.stack(np.meshgrid(*map(np.arange, fine.values.shape), indexing="ij"), axis=-1).reshape(-1, 3)
     coarse = grid.indices(fine.origin + fine.cell * points)
-    from scipy import ndimage
-
     # What thin walls the coarse grid lost beside the part is its own, unless another part is as near.
     nearest = ndimage.distance_transform_edt(label == 0, return_distances=False, return_indices=True)
     own = kept[tuple(nearest)][coarse].reshape(fine.values.shape)
     found, _ = ndimage.label((fine.values < 0) & own)
     numbers = np.bincount(found.ravel())[1:]
-    return (
-        (fine, found > 0)
-        if numbers.size == 0
-        else (fine, np.isin(found, np.flatnonzero(numbers > CRUMB * numbers.max()) + 1))
-    )
+    return fine, np.isin(found, np.flatnonzero(numbers > CRUMB * numbers.max(initial=0)) + 1)
 
 
 def _only(grid: Grid, kept: np.ndarray) -> Grid:
     """Return the field of what is wanted alone, without cavities of a few cells."""
-    from scipy import ndimage
-
     values = np.where((grid.values < 0) & ~kept, -grid.values, grid.values)
     outside, count = ndimage.label(values > 0)
     sizes = np.bincount(outside.ravel(), minlength=count + 1)
@@ -196,8 +183,6 @@ def _only(grid: Grid, kept: np.ndarray) -> Grid:
 
 
 def _band(grid: Grid) -> Grid:
-    from scipy import ndimage
-
     inside = grid.values < 0
     near = ndimage.binary_dilation(inside, iterations=NEAR) & ~ndimage.binary_erosion(inside, iterations=NEAR)
     return Grid(grid.origin, grid.cell, near)
@@ -205,8 +190,6 @@ def _band(grid: Grid) -> Grid:
 
 def _zero(grid: Grid, moved: float) -> tuple[np.ndarray, np.ndarray]:
     """Zero of a field as a closed manifold of few triangles, which lies this far off it at most."""
-    from skimage.measure import marching_cubes
-
     vertices, faces, _, _ = marching_cubes(grid.values, 0.0, spacing=(grid.cell,) * 3)
     try:
         vertices, faces = simplified(vertices, faces, moved)
@@ -216,17 +199,9 @@ def _zero(grid: Grid, moved: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _beside_and_lost(
-    field: SolidField,
-    vertices: np.ndarray,
-    faces: np.ndarray,
-    grid: Grid,
-    label: np.ndarray | None,
-    kept: np.ndarray,
+    field: SolidField, vertices: np.ndarray, faces: np.ndarray, grid: Grid, label: np.ndarray | None, kept: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Points of the surface between inside and outside that the wrap is near, and those that it is not."""
-    import igl
-    from scipy import ndimage
-
     points = field.boundary_samples(SAMPLES, 0.05 * grid.cell)
     inside = ((points > grid.origin) & (points < grid.origin + grid.cell * (np.array(kept.shape) - 1))).all(axis=1)
     points = points[inside]

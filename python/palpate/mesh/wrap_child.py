@@ -13,6 +13,7 @@ import os
 import sys
 import types
 from collections.abc import Callable
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ import numpy as np
 from palpate._native import end_with_parent
 from palpate.mesh.inner_triangles import Triangles, inner_triangles, within_surface
 from palpate.mesh.solid_field import SolidField, cleaned, oriented
-from palpate.mesh.wrap import Wrap, WrapError, wrap
+from palpate.mesh.wrap import Part, Wrap, WrapError, wrap
 
 # The wrap is kept to this part of its diagonal, or of the edge wanted, whichever is less.
 ENVELOPE, ENVELOPE_OF_EDGE = 4.5e-3, 0.06
@@ -50,22 +51,9 @@ def main(surface_file: str, mesh_file: str, stages: str) -> int:
         np.savez(mesh_file, reason=str(error))
         return 1
     target = _beside(field, wrapped)
-    found = {
-        "vertices": wrapped.vertices,
-        "faces": wrapped.faces,
-        "part_volumes": np.array([p.volume for p in wrapped.parts]),
-        "part_middles": np.array([p.middle for p in wrapped.parts]),
-        "part_sides": np.array([p.sides for p in wrapped.parts]),
-        "part_labels": np.array([p.label for p in wrapped.parts]),
-        "volume": wrapped.volume,
-        "cell": wrapped.cell,
-        "points": wrapped.points,
-        "lost_points": wrapped.lost_points,
-        "lost_share": wrapped.lost_share,
-        "closed_share": wrapped.closed_share,
-        "target": field.faces[target],
-        "target_vertices": field.vertices,
-    }
+    found = {name: value for name, value in vars(wrapped).items() if name not in ("parts", "band")}
+    found |= {f"part_{f.name}": np.array([getattr(part, f.name) for part in wrapped.parts]) for f in fields(Part)}
+    found |= {"target": field.faces[target], "target_vertices": field.vertices}
     # Another mesher may fill the wrap where this one fails.
     nodes, tets = np.empty((0, 3)), np.empty((0, 4), dtype=np.int64)
     np.savez(mesh_file, nodes=nodes, tets=tets, **found)

@@ -13,14 +13,13 @@ import numpy as np
 
 from palpate.errors import MeshError, MeshWarning
 from palpate.mesh.child import failure_of, run_limited
-from palpate.mesh.curve import curve, refine
+from palpate.mesh.curve import curve, refine, snap
 from palpate.mesh.elements import face_parts
-from palpate.mesh.fill_job import PARTS, FillJob, length_text
+from palpate.mesh.fill_job import FillJob, length_text
 from palpate.mesh.filling import IN_CUBE, MOST_BY_NETGEN, Filling, MesherFailedError
-from palpate.mesh.fit import GOOD_LOSS, distances, mean_edge
+from palpate.mesh.fit import GOOD_LOSS, change_text, distances, mean_edge
 from palpate.mesh.inner import InnerRegions, faces_between
 from palpate.mesh.size import size_text
-from palpate.mesh.snap import snap
 from palpate.mesh.surface_file import SurfaceFile
 from palpate.mesh.surface_state import SurfaceState
 from palpate.mesh.tetmesh import TetMesh
@@ -66,7 +65,7 @@ class Wrapping:
         origin, extent = points.min(axis=0), float(np.ptp(points, axis=0).max())
         if not extent > 0:
             raise MeshError(f"{self.name}: all of its points coincide")
-        size = extent / PARTS[self.job.element] if self.job.size is None else self.job.size
+        size = self.job.size_in(extent)
         arrays = self._run(origin, extent, size)
         wrap = _Wrapped(arrays, origin, extent)
         halvings = int(wrap.volume * IN_CUBE / size**3 > MOST_BY_NETGEN)
@@ -92,7 +91,6 @@ class Wrapping:
         """Results of the child, in a unit box; without tetrahedra where fTetWild failed or is not there."""
         faces = np.asarray(self.surface.shape.faces)
         labels, part = self.surface.part_of_face, self.job.options.part
-        balls = [[*((np.array(c) - origin) / extent), r / extent, h / extent] for c, r, h in self.job.refine]
         cells = np.clip(CELLS_IN_ELEMENT * extent / size, CELLS, MOST_CELLS)
         with tempfile.TemporaryDirectory(prefix="palpate-") as folder:
             surface_file, mesh_file, stages = (Path(folder) / name for name in ("surface.npz", "mesh.npz", "stages"))
@@ -104,7 +102,7 @@ class Wrapping:
                 size=size / extent,
                 part=0 if part == "all" else part,
                 cells=int(cells),
-                balls=np.reshape(balls, (-1, 5)),
+                balls=self.job.balls(origin, extent, extent),
                 **({} if self.inner is None else self.inner.job(origin, extent)),
             )
             command = [sys.executable, "-m", "palpate.mesh.wrap_child", *map(str, (surface_file, mesh_file, stages))]
@@ -161,8 +159,7 @@ class Wrapping:
         """Warn of what was done and lost, a line each, or refuse the mesh."""
         loss = 1.0 - mesh.volume / wrap.volume
         gap = float(distances(mesh, wrap.points).max()) if len(wrap.points) else 0.0
-        change = f"{'loses' if loss > 0 else 'adds'} {100 * abs(loss):.1f} % of the volume"
-        what = f"the mesh {change} and lies up to {length_text(gap)} off the surface"
+        what = f"the mesh {change_text(loss, gap)}"
         finer = f"--max-size {length_text(0.5 * mean_edge(mesh)).replace(' ', '')} makes a finer one"
         if abs(loss) > float(self.job.options.max_volume_loss):
             allow = f"--max-volume-loss {np.ceil(100 * abs(loss)):.0f}% takes it"
@@ -210,7 +207,7 @@ class _Wrapped:
         self.parts = [
             (float(volume) * extent**3, self.to_metres(middle), sides * extent, int(label))
             for volume, middle, sides, label in zip(
-                *(arrays[f"part_{name}"] for name in ("volumes", "middles", "sides", "labels")), strict=True
+                *(arrays[f"part_{name}"] for name in ("volume", "middle", "sides", "label")), strict=True
             )
         ]
         used = np.unique(arrays["target"])

@@ -50,19 +50,13 @@ class PaperModel:
 PAPER = {
     "doll": PaperModel(894, 2803, 714, 1424, precompute_minutes=5.0, simulation_ms=0.5),
     "kidney": PaperModel(
-        572,
-        1749,
-        454,
-        900,
+        *(572, 1749, 454, 900),
         precompute_minutes=1.1,
         simulation_ms=0.5,
         note="a closed surface of 454 nodes without holes has 904 triangles, not 900",
     ),
     "liver": PaperModel(
-        1931,
-        5430,
-        845,
-        1686,
+        *(1931, 5430, 845, 1686),
         precompute_minutes=27.8,
         simulation_ms=0.6,
         note="5430 tetrahedra with 845 surface nodes have about 1400 nodes, not 1931; tetrahedra and surface are kept",

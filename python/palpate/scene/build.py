@@ -17,7 +17,7 @@ from palpate.errors import Error, SceneError, UnclearUnitError
 from palpate.green import BackgroundPrecompute, GreensFunction, precompute, require_precise
 from palpate.mesh import TetMesh
 from palpate.mesh.elements import EDGES
-from palpate.mesh.label_summary import label_summary
+from palpate.mesh.label_process import label_summary
 from palpate.mesh.size import scale_of
 from palpate.mesh.tetrahedralize import closed_surface, read_surface, tetrahedralize_with
 from palpate.progress import progress_reporter

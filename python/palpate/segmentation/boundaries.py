@@ -1,4 +1,4 @@
-"""Boundaries of chosen segments: one around all of them, and one around each that lies among the others."""
+"""Segments that make a body by default, and boundaries of chosen ones: around all, and around each among the others."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
 from palpate.errors import MeshError
 from palpate.segmentation.label_map import LabelMap, Segment
@@ -15,6 +16,10 @@ from palpate.segmentation.smoothing import Boundary, smooth_boundary
 MOST_BALLS, COVER = 48, 2.4
 # A segment that was not chosen is named if this share of it lies in a cavity of those that were.
 IN_CAVITY = 0.5
+# Segments of fewer voxels are no part of a body by default, and more segments than this take long to fill.
+LEAST_VOXELS, MOST_SEGMENTS = 64, 8
+# Of a segment, at least this share hangs together with the largest.
+CONNECTED = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,9 +68,7 @@ def boundaries(labels: LabelMap, wanted: Sequence[str | int]) -> Boundaries:
 
 
 def _in_cavities(labels: LabelMap, chosen: tuple[Segment, ...], union: np.ndarray) -> list[tuple[str, float]]:
-    from scipy import ndimage
-
-    cavity = ndimage.binary_fill_holes(union) & ~union
+    cavity = scipy.ndimage.binary_fill_holes(union) & ~union
     if not cavity.any():
         return []
     found = []
@@ -81,10 +84,8 @@ def _in_cavities(labels: LabelMap, chosen: tuple[Segment, ...], union: np.ndarra
 
 def covering_balls(boundary: Boundary) -> np.ndarray:
     """Balls (k, 5) over a segment: centre (3), radius, and half of the thickness there, m; the thickest come first."""
-    from scipy import ndimage
-
     spacing = np.linalg.norm(boundary.affine[:3, :3], axis=0)
-    depth = ndimage.distance_transform_edt(boundary.field > 0, sampling=spacing)
+    depth = scipy.ndimage.distance_transform_edt(boundary.field > 0, sampling=spacing)
     places = np.argwhere(depth > 0)
     depths = depth[tuple(places.T)]
     points = places @ boundary.affine[:3, :3].T + boundary.affine[:3, 3]
@@ -96,3 +97,32 @@ def covering_balls(boundary: Boundary) -> np.ndarray:
         left = np.linalg.norm(points - points[deepest], axis=1) > reach
         points, depths = points[left], depths[left]
     return np.array(balls).reshape(-1, 5)
+
+
+def default_segments(labels: LabelMap) -> tuple[list[Segment], list[str]]:
+    """Segments, the largest first, and the names of those that are left out."""
+    counts = {segment: labels.count(segment) for segment in labels.segments}
+    ordered = [s for s in sorted(labels.segments, key=lambda s: -counts[s]) if counts[s] >= LEAST_VOXELS]
+    if not ordered:
+        ordered = [max(labels.segments, key=lambda s: counts[s])]
+    union = np.any([labels.mask(segment) for segment in ordered], axis=0)
+    parts, _ = scipy.ndimage.label(union)
+    body = parts == np.bincount(parts[labels.mask(ordered[0])]).argmax()
+    chosen = []
+    for segment in ordered:
+        mask = labels.mask(segment)
+        inside = np.count_nonzero(mask & body) >= CONNECTED * counts[segment]
+        # One that says the same as another, in another layer, would cover it.
+        if inside and len(chosen) < MOST_SEGMENTS and not _same(labels, chosen, mask):
+            chosen.append(segment)
+    return chosen, [segment.name for segment in labels.segments if segment not in chosen]
+
+
+def _same(labels: LabelMap, chosen: Sequence[Segment], mask: np.ndarray) -> bool:
+    return any(np.array_equal(labels.mask(segment), mask) for segment in chosen)
+
+
+def selectors(labels: LabelMap, segments: Sequence[Segment]) -> list[str]:
+    """Names by which segments are chosen, or their labels where names are not unique."""
+    names = [segment.name.lower() for segment in labels.segments]
+    return [s.name if names.count(s.name.lower()) == 1 else str(s.value) for s in segments]

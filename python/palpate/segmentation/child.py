@@ -17,6 +17,7 @@ import numpy as np
 
 from palpate._native import end_with_parent
 from palpate.errors import Error
+from palpate.segmentation.boundaries import boundaries, covering_balls
 from palpate.segmentation.label_map import LabelMap
 from palpate.segmentation.reading import load_label_map
 
@@ -44,14 +45,12 @@ def _summary(labels: LabelMap, segments: Sequence[str | int] | None) -> dict[str
         "voxel_volume": labels.voxel_volume,
         "names": np.array([s.name for s in labels.segments], dtype=str),
         "values": [s.value for s in labels.segments],
-        "voxels": [int(np.count_nonzero(labels.mask(s))) for s in labels.segments],
+        "voxels": [labels.count(s) for s in labels.segments],
     }
 
 
 def _boundaries(labels: LabelMap, segments: Sequence[str | int]) -> dict[str, Any]:
     """Boundaries of segments."""
-    from palpate.segmentation.boundaries import boundaries, covering_balls
-
     found = boundaries(labels, segments)
     whole, titles = found.whole, [segment.name for segment in found.segments]
     # Segments of one name, chosen by their labels, have the labels in the names of their regions.
@@ -69,14 +68,8 @@ def _boundaries(labels: LabelMap, segments: Sequence[str | int]) -> dict[str, An
         "cavity_volumes": np.array([volume for _, volume in found.in_cavities], dtype=float),
     }
     for rank, boundary in found.inner.items():
-        arrays |= {
-            f"vertices_{rank}": boundary.vertices,
-            f"faces_{rank}": boundary.faces,
-            f"field_{rank}": boundary.field,
-            f"affine_{rank}": boundary.affine,
-            f"smoothed_{rank}": np.array([boundary.volume, boundary.width]),
-            f"balls_{rank}": covering_balls(boundary),
-        }
+        arrays |= {f"{name}_{rank}": getattr(boundary, name) for name in ("vertices", "faces", "field", "affine")}
+        arrays[f"balls_{rank}"] = covering_balls(boundary)
     return arrays
 
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -12,6 +14,8 @@ from palpate.errors import MeshError
 
 # So many names are listed in a message.
 MOST_NAMED = 20
+# Bytes of voxels that are read: a CT of the whole body, 512 x 512 x 2000 of two bytes, has 1e9.
+MOST_BYTES = 4 << 30
 
 
 @dataclass(frozen=True)
@@ -48,6 +52,10 @@ class LabelMap:
     def mask(self, segment: Segment) -> np.ndarray:
         """Voxels (nx, ny, nz) of a segment."""
         return self.layers[segment.layer] == segment.value
+
+    def count(self, segment: Segment) -> int:
+        """How many voxels a segment has."""
+        return int(np.count_nonzero(self.mask(segment)))
 
     def find(self, wanted: str | int) -> Segment:
         """Find a segment by its name, or by its label where no name fits.
@@ -88,3 +96,26 @@ class LabelMap:
         shown = ", ".join(f"'{s.name}'" for s in self.segments[:MOST_NAMED])
         more = len(self.segments) - MOST_NAMED
         return f"the file has {shown}{f' and {more} more' if more > 0 else ''}"
+
+
+@dataclass(frozen=True, eq=False)
+class RawImage:
+    """Voxels as they stand in a file."""
+
+    layers: np.ndarray  # (layers, nx, ny, nz) numbers of any kind
+    affine: np.ndarray  # (4, 4) from indices to right, anterior, superior, in the file's unit
+    unit: str | None  # unit of length that the file names; None: none
+    segments: tuple[Segment, ...] | None  # segments that the file names; None: none
+
+
+def require_size(path: Path, sizes: Sequence[int], dtype: np.dtype) -> None:
+    """Refuse an image that is too large by its header, before anything of it is read.
+
+    Raises MeshError for more than ``MOST_BYTES``.
+    """
+    size = math.prod(map(int, sizes), start=dtype.itemsize)
+    if size > MOST_BYTES:
+        raise MeshError(
+            f"{path}: {' x '.join(map(str, sizes))} voxels take {size / 2**30:.3g} GiB, more than the "
+            f"{MOST_BYTES >> 30} GiB that are read; crop the image around the segments"
+        )

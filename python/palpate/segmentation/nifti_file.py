@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import gzip
-import logging
-import warnings
 import zlib
 from pathlib import Path
 
 import numpy as np
 
 from palpate.errors import MeshError
-from palpate.segmentation.raw_image import RawImage, require_size
+from palpate.input_file import quiet, reason_text
+from palpate.segmentation.label_map import RawImage, require_size
 
 # Names of `xyzt_units` (nifti1.h) and those of this package.
 UNITS = {"meter": "m", "mm": "mm", "micron": "um"}
@@ -25,13 +24,8 @@ def read_nifti(path: Path) -> RawImage:
     """
     import nibabel
 
-    # nibabel logs what it mends in a header.
-    log = logging.getLogger("nibabel")
-    level = log.level
-    log.setLevel(logging.CRITICAL + 1)
     try:
-        with warnings.catch_warnings(), np.errstate(all="ignore"):
-            warnings.simplefilter("ignore")
+        with quiet("nibabel"):
             # Before it is opened: nibabel reads the header of what is no NIfTI file as another format's.
             image = nibabel.Nifti1Image.from_filename(path) if _version(path) == 1 else nibabel.Nifti2Image.load(path)
             _require_three_axes(path, image.shape)
@@ -43,16 +37,10 @@ def read_nifti(path: Path) -> RawImage:
     except MeshError:
         raise
     except (EOFError, zlib.error, gzip.BadGzipFile) as error:
-        raise MeshError(f"{path}: the file is cut short or damaged ({_brief(error)})") from None
+        raise MeshError(f"{path}: the file is cut short or damaged ({reason_text(error)})") from None
     except Exception as error:
-        raise MeshError(f"{path}: cannot be read as a NIfTI file ({_brief(error)})") from None
-    finally:
-        log.setLevel(level)
+        raise MeshError(f"{path}: cannot be read as a NIfTI file ({reason_text(error)})") from None
     return RawImage(voxels[None], affine, unit, None)
-
-
-def _brief(error: Exception) -> str:
-    return " ".join(str(error).split())[:150] or type(error).__name__
 
 
 def _version(path: Path) -> int:

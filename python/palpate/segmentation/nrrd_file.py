@@ -10,13 +10,15 @@ import bz2
 import re
 import zlib
 from pathlib import Path
-from typing import Any, BinaryIO, Protocol
+from typing import Any, BinaryIO
 
+import nrrd
 import numpy as np
+from nrrd.reader import _TYPEMAP_NRRD2NUMPY as NAMES
 
 from palpate.errors import MeshError
-from palpate.segmentation.label_map import Segment
-from palpate.segmentation.raw_image import RawImage, require_size
+from palpate.input_file import reason_text
+from palpate.segmentation.label_map import RawImage, Segment, require_size
 
 # Bytes of a header; those of 3D Slicer have some tens of thousands.
 MOST_HEADER = 4 << 20
@@ -31,12 +33,6 @@ SPACES = {
     "3d-right-handed": (1, 1, 1),
 }
 SHORT = {"ras": "right-anterior-superior", "las": "left-anterior-superior", "lps": "left-posterior-superior"}
-
-
-class _Decompressor(Protocol):
-    eof: bool
-
-    def decompress(self, data: bytes, max_length: int) -> bytes: ...
 
 
 def read_nrrd(path: Path) -> RawImage:
@@ -62,8 +58,6 @@ def read_nrrd(path: Path) -> RawImage:
 
 def _header(path: Path, file: BinaryIO) -> dict[str, Any]:
     """Parse the lines up to the first empty one, where the file then stands."""
-    import nrrd
-
     lines: list[str] = []
     size = 0
     while size < MOST_HEADER:
@@ -80,7 +74,7 @@ def _header(path: Path, file: BinaryIO) -> dict[str, Any]:
     try:
         return dict(nrrd.read_header(lines))
     except Exception as error:
-        raise MeshError(f"{path}: the header is damaged ({' '.join(str(error).split())[:150]})") from None
+        raise MeshError(f"{path}: the header is damaged ({reason_text(error)})") from None
 
 
 def _sizes(path: Path, header: dict[str, Any]) -> tuple[tuple[int, ...], bool]:
@@ -103,8 +97,6 @@ def _sizes(path: Path, header: dict[str, Any]) -> tuple[tuple[int, ...], bool]:
 
 
 def _dtype(path: Path, header: dict[str, Any]) -> np.dtype:
-    from nrrd.reader import _TYPEMAP_NRRD2NUMPY as NAMES
-
     name = NAMES.get(header["type"])
     if name is None or name.startswith("V"):
         raise MeshError(f"{path}: voxels of type '{header['type']}' are not read; labels are whole numbers")
@@ -131,7 +123,7 @@ def _content(path: Path, file: BinaryIO, header: dict[str, Any], size: int) -> b
     return content
 
 
-def _inflated(path: Path, file: BinaryIO, stream: _Decompressor, size: int) -> bytes:
+def _inflated(path: Path, file: BinaryIO, stream: Any, size: int) -> bytes:
     parts, count = [], 0
     waiting = b""
     try:

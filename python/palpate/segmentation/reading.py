@@ -10,10 +10,9 @@ import numpy as np
 from palpate.errors import MeshError
 from palpate.input_file import require_file
 from palpate.segmentation.endings import SEGMENTATION_ENDINGS, is_segmentation
-from palpate.segmentation.label_map import LabelMap, Segment
+from palpate.segmentation.label_map import LabelMap, RawImage, Segment
 from palpate.segmentation.nifti_file import read_nifti
 from palpate.segmentation.nrrd_file import read_nrrd
-from palpate.segmentation.raw_image import RawImage
 from palpate.units import LENGTH_UNITS, length_scale
 
 # Largest label. FreeSurfer's go to 14,175.

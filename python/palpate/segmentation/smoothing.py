@@ -16,6 +16,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
 # Standard deviation of the Gaussian and limit of the distance, in parts of the largest distance of voxels; rounds.
 # Measured on an ellipsoid of 60 x 45 x 35 mm in voxels of 0.7 x 0.7 x 2.5 mm: 4 rounds leave 0.10 mm (root mean
@@ -57,10 +58,8 @@ class Boundary:
 
 def inside_field(field: np.ndarray, affine: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Whether points (k, 3), m, lie where a field is positive; beyond its grid they do not."""
-    from scipy import ndimage
-
     indices = (points - affine[:3, 3]) @ np.linalg.inv(affine[:3, :3]).T
-    return ndimage.map_coordinates(field, indices.T, order=1, mode="constant", cval=-1.0) > 0
+    return scipy.ndimage.map_coordinates(field, indices.T, order=1, mode="constant", cval=-1.0) > 0
 
 
 def smooth_boundary(mask: np.ndarray, affine: np.ndarray) -> Boundary:
@@ -119,11 +118,9 @@ def _distance(mask: np.ndarray, spacing: np.ndarray) -> np.ndarray:
     The distance to the nearest centre on the other side, less half a voxel in that direction: half of `sqrt(sum_k (u_k
     h_k)^2)`, `u` the unit direction to it. Along an axis that is `h_k / 2`.
     """
-    from scipy import ndimage
-
     values = np.empty(mask.shape, np.float32)
     for side, sign in ((mask, 1.0), (~mask, -1.0)):
-        away, nearest = ndimage.distance_transform_edt(side, sampling=spacing, return_indices=True)
+        away, nearest = scipy.ndimage.distance_transform_edt(side, sampling=spacing, return_indices=True)
         squared = np.zeros(mask.shape, np.float32)
         for axis, own in enumerate(np.ogrid[tuple(slice(n) for n in mask.shape)]):
             squared += ((nearest[axis] - own) * (spacing[axis] ** 2)) ** 2
@@ -134,8 +131,6 @@ def _distance(mask: np.ndarray, spacing: np.ndarray) -> np.ndarray:
 
 def _smoothed(mask: np.ndarray, affine: np.ndarray, width: float) -> tuple[np.ndarray, np.ndarray]:
     """Smoothed distance of a mask and its surroundings, on cells about as long along all axes."""
-    from scipy import ndimage
-
     spacing = np.linalg.norm(affine[:3, :3], axis=0)
     largest = float(spacing.max())
     limit = LIMIT * largest
@@ -146,8 +141,8 @@ def _smoothed(mask: np.ndarray, affine: np.ndarray, width: float) -> tuple[np.nd
     values = np.clip(_distance(mask, spacing), -limit, limit)
 
     def smooth(values: np.ndarray, width: float) -> np.ndarray:
-        once = ndimage.gaussian_filter(values, width / spacing, mode="nearest", truncate=REACH)
-        return 2 * once - ndimage.gaussian_filter(once, width / spacing, mode="nearest", truncate=REACH)
+        once = scipy.ndimage.gaussian_filter(values, width / spacing, mode="nearest", truncate=REACH)
+        return 2 * once - scipy.ndimage.gaussian_filter(once, width / spacing, mode="nearest", truncate=REACH)
 
     for _ in range(ROUNDS):
         values = np.clip(smooth(values, width), -limit, limit)
@@ -158,7 +153,7 @@ def _smoothed(mask: np.ndarray, affine: np.ndarray, width: float) -> tuple[np.nd
     cell = max(float(spacing.min()), float((spacing * counts).max()) / MOST_CELLS)
     finer = np.maximum(np.rint((counts - 1) * spacing / cell), counts - 1).astype(int) + 1
     if (finer > counts).any():
-        values = ndimage.zoom(values, finer / counts, order=3, mode="nearest", grid_mode=False)
+        values = scipy.ndimage.zoom(values, finer / counts, order=3, mode="nearest", grid_mode=False)
         affine = affine.copy()
         affine[:3, :3] *= (counts - 1) / (np.array(values.shape) - 1)
     return values, affine

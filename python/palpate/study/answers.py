@@ -16,6 +16,7 @@ import numpy as np
 
 from palpate import _native
 from palpate.body import Body, description, problem_arrays
+from palpate.cache import digest
 from palpate.cluster import require_version, use_threads_of_worker
 from palpate.errors import Error, PalpateWarning
 from palpate.green import GreensFunction
@@ -26,7 +27,7 @@ from palpate.scene.default_radius import PART_OF_BODY, default_contact_radius
 from palpate.scene.node_file import is_node_file
 from palpate.scene.regions import CONSTANTS, MaterialTable
 from palpate.scene.tables import SupportsTable
-from palpate.study.tables import PressTable, StudyScene
+from palpate.study.cases import PressTable, StudyScene
 
 # Of a store with a handful of columns nothing is gained by fewer bits.
 PRECISION = "f64"
@@ -99,8 +100,7 @@ def operator_key(scene: StudyScene) -> str:
         body.pop(name)
     if scales_with_modulus(scene):
         (body["material"] or tables["material"]).pop("youngs_modulus")
-    content = json.dumps([_native.__version__, mesh_key(scene), tables], sort_keys=True)
-    return hashlib.sha256(content.encode()).hexdigest()
+    return digest([_native.__version__, mesh_key(scene), tables])
 
 
 def case_key(scene: StudyScene) -> str:
@@ -211,13 +211,10 @@ def _operator(scene: StudyScene) -> GreensFunction:
 
 def _of_reference_modulus(scene: StudyScene) -> StudyScene:
     body = scene.bodies[0]
-    if body.material is None:
-        return scene.model_copy(update={"material": _with_reference(scene.material)})
-    return scene.model_copy(update={"bodies": [body.model_copy(update={"material": _with_reference(body.material)})]})
-
-
-def _with_reference(material: MaterialTable) -> MaterialTable:
-    return material.model_copy(update={"youngs_modulus": REFERENCE_MODULUS})
+    material = {"material": _material(scene).model_copy(update={"youngs_modulus": REFERENCE_MODULUS})}
+    return scene.model_copy(
+        update=material if body.material is None else {"bodies": [body.model_copy(update=material)]}
+    )
 
 
 def _touched_nodes(body: Body, presses: Sequence[PressTable]) -> np.ndarray:

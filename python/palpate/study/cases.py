@@ -8,13 +8,14 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import ValidationError
+from pydantic import BeforeValidator, Field, ValidationError, field_validator, model_validator
 
 from palpate.errors import SceneError
+from palpate.scene import Scene
 from palpate.scene.mistakes import explain, located
-from palpate.study.tables import StudyScene, StudyTables
+from palpate.scene.table import Coordinate, Point, Radius, Table
 
 # What a study may vary.
 VARIED = ("body", "material", "region", "supports", "loads", "press")
@@ -23,6 +24,9 @@ MOST_CASES = 10_000
 
 Key = tuple[str, ...]
 Place = tuple[str | int, ...]
+# A component in the file that the press leaves free.
+FREE = "-"
+Component = Annotated[Coordinate | None, BeforeValidator(lambda value: None if value == FREE else value)]
 
 
 @dataclass(frozen=True)
@@ -161,3 +165,45 @@ def _check(scene: StudyScene, path: Path, text: str) -> None:
 def _is_rank(step: str) -> bool:
     """Whether a step of a place is the number of an entry."""
     return step.isascii() and step.isdigit()
+
+
+class PressTable(Table):
+    """A press: the surface closest to ``point`` (m, in the frame of the body) is moved by ``displacement`` (m).
+
+    A component of ``"-"`` is left free. ``radius`` (m) is that of the patch, 0 a point; by default a sixteenth of the
+    body's longest side.
+    """
+
+    name: str | None = None
+    """Name in the table of results."""
+    point: Point
+    """Point near the pressed place of the surface."""
+    displacement: tuple[Component, Component, Component]
+    """Displacement of the patch; `"-"` leaves a component free."""
+    radius: Radius | None = None
+    """Radius of the patch; 0 is a point. Default: a sixteenth of the longest side of the body."""
+
+    @model_validator(mode="after")
+    def _presses(self) -> PressTable:
+        if not any(self.displacement):
+            raise ValueError("a press needs a displacement: give a component other than 0 and '-'")
+        return self
+
+
+class StudyScene(Scene):
+    """One body of a study, with what is asked of it."""
+
+    presses: list[PressTable] = Field(alias="press", min_length=1)
+
+    @field_validator("presses", mode="before")
+    @classmethod
+    def _single_press(cls, tables: Any) -> Any:
+        """Take a single table as the only entry."""
+        return tables if isinstance(tables, list) else [tables]
+
+
+class StudyTables(StudyScene):
+    """Everything that may stand in the file."""
+
+    grid: dict[str, Any] = Field(default_factory=dict)
+    cases: list[dict[str, Any]] = Field(default_factory=list, alias="case")

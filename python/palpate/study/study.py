@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from palpate import _native
 from palpate.atomic import naming
+from palpate.cache import digest
 from palpate.cluster import connected, result_of, spread, submit
 from palpate.errors import SceneError
 from palpate.input_file import read_toml, require_file
@@ -132,7 +132,7 @@ class Study:
 
 
 class _AnswerFile:
-    """What bodies have answered, a line of JSON each, appended as they are done; a torn line does not count."""
+    """What bodies have answered, a line of JSON each, appended as they are done; torn and damaged ones do not count."""
 
     def __init__(self, path: Path):
         self.known: dict[str, Answers] = {}
@@ -143,7 +143,7 @@ class _AnswerFile:
             whole += len(line)
             with contextlib.suppress(ValueError, KeyError, TypeError, AttributeError):
                 record = json.loads(line)
-                if record.pop("sum") == _sum(record):
+                if record.pop("sum") == digest(record):
                     key = record.pop("key")
                     self.known[key] = Answers(**record)
         self._path = path
@@ -162,10 +162,5 @@ class _AnswerFile:
         """Add what a body has answered; it is in the system's hands when this returns."""
         line = {"key": key, **asdict(answer)}
         with naming(self._path):
-            self._stream.write(json.dumps({**line, "sum": _sum(line)}).encode() + b"\n")
+            self._stream.write(json.dumps({**line, "sum": digest(line)}).encode() + b"\n")
             self._stream.flush()
-
-
-def _sum(line: Mapping[str, Any]) -> str:
-    """Checksum of an answer that is kept: a damaged digit would be an answer of its own."""
-    return hashlib.sha256(json.dumps(line, sort_keys=True).encode()).hexdigest()

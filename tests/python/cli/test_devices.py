@@ -36,9 +36,9 @@ def pads(monkeypatch):
     def listings(which=None):
         return [listing for listing in (NONE, PADS) if which is None or listing.kind in which]
 
-    monkeypatch.setattr(palpate.devices, "listings", listings)
-    monkeypatch.setattr(palpate.devices, "usb_devices", list)
-    monkeypatch.setattr(palpate.devices, "SelfCheck", lambda kind, id: SelfCheck(held))
+    monkeypatch.setattr(command, "listings", listings)
+    monkeypatch.setattr(command, "usb_devices", list)
+    monkeypatch.setattr(command, "SelfCheck", lambda kind, id: SelfCheck(held))
     monkeypatch.setattr(command, "is_terminal", lambda: True)
     for name, value in {"REST": 0.3, "RANGE": 0.2, "RANGE_UNATTENDED": 0.2, "RISE": 0.2, "RETURN": 0.1}.items():
         monkeypatch.setattr(command, name, value)

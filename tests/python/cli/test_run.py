@@ -74,7 +74,7 @@ def test_the_size_of_a_scene_is_printed_before_it_is_computed(capsys, monkeypatc
 
 @pytest.mark.slow
 def test_options_of_a_bare_surface_are_those_of_a_scene(capsys, tmp_path):
-    options = RunOptions("8mm", "z < min + 1mm", "20kPa", 0.4, "900kg/m3", "mm", "2cm")
+    options = RunOptions("8mm", "z < min + 1mm", "20kPa", 0.4, "mm", density="900kg/m3", max_size="2cm")
     built = built_from(BLOCK, options)
     # No option chooses it.
     assert capsys.readouterr().out.endswith("; by default law neo-hookean (a scene may name another)\n")
@@ -146,7 +146,7 @@ def test_a_tool_larger_than_the_body_is_refused_before_columns_are_computed(bloc
     def compute(*_, **__):
         raise AssertionError("computing")
 
-    for place in ("palpate.scene.build.precompute", "palpate.green.precompute"):
+    for place in ("palpate.scene.build.precompute", "palpate.cli.run_file.precompute"):
         monkeypatch.setattr(place, compute)
     box_mesh().write(tmp_path / "box.vtu", unit="m")
     trimesh.creation.box((0.08, 0.05, 0.05)).export(tmp_path / "box.stl")

@@ -19,9 +19,9 @@ from conftest import box_mesh
 
 import palpate
 from palpate.mesh.child import run_limited
-from palpate.mesh.crossings import first_crossing
 from palpate.mesh.fill_job import FillOptions
 from palpate.mesh.fit import Fit, distances
+from palpate.mesh.surface_state import first_crossing
 from palpate.mesh.tetrahedralize import tetrahedralize_with
 
 

@@ -12,7 +12,7 @@ from label_maps import ball, ellipsoid, labels_of, turned, write_nifti, write_nr
 import palpate
 from palpate.mesh.fill_job import FillOptions
 from palpate.mesh.inner import faces_between
-from palpate.mesh.label_summary import label_summary
+from palpate.mesh.label_process import label_summary
 from palpate.mesh.tetrahedralize import tetrahedralize_with
 from palpate.progress import Reporter
 

@@ -12,10 +12,10 @@ from conftest import box_mesh
 
 import palpate
 from palpate.mesh.child import OUT_OF_PROCESSOR_TIME
+from palpate.mesh.curve import LEAST_ANGLE, snap
 from palpate.mesh.elements import smallest_dihedral_angles
 from palpate.mesh.fill_job import FillOptions
 from palpate.mesh.filling import Filling
-from palpate.mesh.snap import LEAST_ANGLE, snap
 from palpate.mesh.solid_field import SolidField, cleaned, oriented
 from palpate.mesh.tetrahedralize import tetrahedralize_with
 from palpate.mesh.wrap import WrapError, wrap

@@ -11,7 +11,7 @@ import pyvista
 import trimesh
 
 import palpate
-from palpate.fields import SurfaceStrain, interior
+from palpate.fields import Interior, SurfaceStrain
 from palpate.green import function
 from palpate.mesh import TetMesh
 from palpate.scene import BuiltScene
@@ -148,7 +148,7 @@ def test_of_a_large_body_the_surface_alone_is_followed(sheet, monkeypatch):
     green = palpate.GreensFunction(small._core, body)
     pushed = 1e-3 * np.outer(np.exp(-((green.surface_positions[:, 0] / 0.03) ** 2)), (0.0, 0.0, -1.0))
     with monkeypatch.context() as patch:
-        patch.setattr(interior.Interior, "__init__", lambda *_: pytest.fail("the inner part was factorised"))
+        patch.setattr(Interior, "__init__", lambda *_: pytest.fail("the inner part was factorised"))
         session = Session(BuiltScene.of(palpate.Scene.of_store("sheet.palpate"), body, green))
         session.start()
         try:

@@ -13,7 +13,7 @@ from viewer_client import page, serving
 import palpate
 from palpate.body.tissues import TISSUES
 from palpate.segmentation import load_label_map
-from palpate.segmentation.default_segments import default_segments, selectors
+from palpate.segmentation.boundaries import default_segments, selectors
 from palpate.viewer.upload import ENDINGS, Upload
 
 SEMI, AT, RADIUS = (40.0, 30.0, 22.0), (12.0, -6.0, 8.0), 7.0

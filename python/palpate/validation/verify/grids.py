@@ -8,12 +8,11 @@ one node and the tetrahedra that lost their volume are left out; what remains st
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from itertools import permutations
 
 import numpy as np
 
 from palpate.mesh import TetMesh
-from palpate.mesh.elements import unique_edges
+from palpate.mesh.elements import kuhn_tets, unique_edges
 
 # Points closer than this part of the body's size are one node.
 SAME = 1e-9
@@ -51,7 +50,7 @@ def mapped(coordinates: np.ndarray, place: Place = np.asarray, *, quadratic: boo
     grid = np.round(points / (SAME * np.ptp(points, axis=0).max())).astype(np.int64)
     _, first, node = np.unique(grid, axis=0, return_index=True, return_inverse=True)
     node = node.ravel()
-    tets = node[_kuhn(coordinates.shape[:3])]
+    tets = node[kuhn_tets(coordinates.shape[:3])]
     whole = (np.diff(np.sort(tets, axis=1), axis=1) > 0).all(axis=1)
     nodes, tets = points[first], tets[whole]
     if not quadratic:
@@ -82,21 +81,6 @@ def jittered(mesh: TetMesh, part: float, seed: int) -> TetMesh:
     nodes = mesh.nodes.copy()
     nodes[inside] += part * shortest * np.random.default_rng(seed).uniform(-1, 1, (len(inside), 3))
     return TetMesh(nodes, mesh.tets)
-
-
-def _kuhn(shape: tuple[int, ...]) -> np.ndarray:
-    """Six tetrahedra for each cell: the paths from its first to its last corner along the axes, (6 cells, 4)."""
-    index = np.arange(np.prod(shape)).reshape(shape)
-    paths = []
-    for order in permutations(range(3)):
-        corner, path = np.zeros(3, dtype=int), []
-        for axis in (*order, None):
-            low = tuple(slice(c, s - 1 + c) for c, s in zip(corner, shape, strict=True))
-            path.append(index[low].ravel())
-            if axis is not None:
-                corner[axis] = 1
-        paths.append(np.column_stack(path))
-    return np.concatenate(paths)
 
 
 def _with_gaps(given: np.ndarray, first: np.ndarray, node: np.ndarray) -> np.ndarray:

@@ -1,8 +1,10 @@
-"""The accuracy table from the command line."""
+"""Commands that measure: the accuracy table, and whether this machine keeps 1 kHz."""
 
 from __future__ import annotations
 
 import json
+import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,6 +12,10 @@ import typer
 
 from palpate.cli.app import app
 from palpate.cli.completion import checks
+from palpate.errors import Error
+from palpate.input_file import require_writable
+from palpate.progress import progress_reporter, status_line
+from palpate.validation.plots import plot_wakeups
 
 if TYPE_CHECKING:
     from palpate.validation.verify import Benchmark, Check, Outcome
@@ -31,7 +37,6 @@ def verify(
 
     Example: palpate verify convergence felt --out plots
     """
-    from palpate.progress import status_line
     from palpate.validation.verify import chosen
 
     outcomes: list[tuple[Benchmark, Outcome]] = []
@@ -52,8 +57,6 @@ def verify(
 
 
 def _as_rows(outcomes: list[tuple[Benchmark, Outcome]]) -> list[dict]:
-    from dataclasses import asdict
-
     return [
         {"benchmark": benchmark.name, **asdict(check), "error": check.error, "verdict": _verdict(check)}
         for benchmark, outcome in outcomes
@@ -105,3 +108,31 @@ def _verdict(check: Check) -> str:
     if check.tolerance is None:
         return "shown"
     return "pass" if check.passed else "FAIL"
+
+
+@app.command()
+def doctor(
+    seconds: Annotated[float, typer.Option(min=1.0, max=3600.0, help="How long the loop runs.")] = 30.0,
+    plot: Annotated[Path | None, typer.Option(help="Draw the histogram of wake-ups into this PNG.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, with the same keys on every machine.")] = False,
+) -> None:
+    """Measure whether this machine keeps 1 kHz, and print what to change.
+
+    It reads limits, kernel and processors, runs the loop, plays every kind of tick, and opens the page.
+
+    Example: palpate doctor --seconds 10
+
+    Example: palpate doctor --json > machine.json
+    """
+    if plot is not None:
+        require_writable(plot, Error)
+    from palpate.validation import doctor as module
+
+    with progress_reporter("running the loop", True) as bar:
+        report = None if bar is None else lambda passed: bar(round(10 * passed), round(10 * seconds))
+        found = module.examine(seconds, report)
+    if plot is not None:
+        granted = "with" if found.loop.priority else "without"
+        plot_wakeups(found.loop.wakeup_us, f"wake-up of the loop, {granted} real-time priority, {seconds:g} s", plot)
+        print(f"wrote {plot}", file=sys.stderr)
+    print(json.dumps(module.as_json(found), indent=2) if as_json else module.as_text(found))
