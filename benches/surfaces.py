@@ -19,7 +19,7 @@ import numpy as np
 from benches.output import Table
 from palpate import models
 from palpate.scene import BuiltScene, model_scene
-from palpate.validation.doctor.chromium import browser_page
+from palpate.validation.doctor.measure import browser_page
 from palpate.viewer import drawn_surface as drawing
 from palpate.viewer import messages
 from palpate.viewer.drawn_surface import drawn_surface
