@@ -79,10 +79,10 @@ class BackgroundPrecompute:
         memory = job.allowed(None)
         job.make_room()
         self._child = child = start_child("palpate.green.child")
-        names = ("arguments", "precision_name", "within", "description", "path", "memory", "first", "key")
-        values = (job.problem, precision, CHOSEN, job.description, job.target, memory, job.first, job.key)
         assert child.stdin is not None and child.stdout is not None
         self._input = child.stdin
+        names = ("arguments", "precision_name", "within", "description", "path", "memory", "first", "key")
+        values = (job.problem, precision, CHOSEN, job.description, job.target, memory, job.first, job.key)
         send_job(self._input, dict(zip(names, values, strict=True)))
         self._listener = threading.Thread(
             target=self._listen, args=(child.stdout,), name="palpate-columns", daemon=True
@@ -232,9 +232,3 @@ class BackgroundPrecompute:
         self._listener.join()
         assert self._child.stdout is not None
         self._child.stdout.close()
-
-    def __enter__(self) -> BackgroundPrecompute:
-        return self
-
-    def __exit__(self, *_exception: object) -> None:
-        self.close()

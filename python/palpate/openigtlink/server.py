@@ -9,7 +9,6 @@ import socket
 import sys
 import threading
 import time
-from types import TracebackType
 
 from palpate.errors import ViewerError
 from palpate.openigtlink.link import Link
@@ -79,9 +78,7 @@ class LinkServer:
         self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         self.stop()
 
     def stop(self) -> None:

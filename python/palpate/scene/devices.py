@@ -183,5 +183,9 @@ def device_change(scene: _Scene, tool: int, kind: str) -> dict[str, Any]:
     tables = tables_of_tools(scene)
     settings = tables[tool].model_dump(exclude_unset=True, exclude={"id", "address", "library"})
     tables[tool] = DeviceTable(**{**settings, "kind": kind})
-    tools = [named.model_copy(update={"device": None}) for named in scene.tools]
-    return {"tools": tools, "device": tables[0], "additional_devices": tables[1:]}
+    return {"tools": without_devices(scene.tools), "device": tables[0], "additional_devices": tables[1:]}
+
+
+def without_devices(tools: Sequence[_Tool]) -> list[Any]:
+    """Tools that name no device: each takes the table of its rank."""
+    return [tool.model_copy(update={"device": None}) for tool in tools]

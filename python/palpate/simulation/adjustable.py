@@ -1,19 +1,55 @@
-"""Settings of a simulation that may be changed while its loop runs."""
+"""Settings of a simulation that may be changed while its loop runs: numbers in SI, or text with a unit."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from numbers import Integral
 from typing import Any
 
 import numpy as np
 
-from palpate import _native
+from palpate import _native, units
 from palpate.errors import SceneError
-from palpate.scene import BuiltBody
+from palpate.scene import MOST_FRICTION, BuiltBody
 from palpate.scene.tables import SceneTables
 from palpate.simulation.script import strike_of
-from palpate.simulation.settings import checked
+from palpate.vectors import number
+
+Check = tuple[Callable[[Any], float], Callable[[float], bool], str]
+
+
+def _plain(what: str) -> Callable[[Any], float]:
+    return lambda value: number(value, what, SceneError)
+
+
+# By name: how a value is read, whether it is within its range, and what is said of one that is not.
+_CHECKS: dict[str, Check] = {
+    "contact_radius": (units.length, lambda x: x >= 0, "the contact radius must not be negative, got {:g} m"),
+    "youngs_modulus": (units.pressure, lambda x: x > 0, "Young's modulus must be positive, got {:g} Pa"),
+    "friction": (
+        _plain("friction"),
+        lambda x: 0 <= x <= MOST_FRICTION,
+        f"friction must lie between 0 and {MOST_FRICTION:g}, got {{:g}}",
+    ),
+    "strain_limit": (
+        _plain("the limit of strain"),
+        lambda x: 0 <= x <= 1,
+        "the limit of strain must lie in [0, 1], got {:g}",
+    ),
+    "time_scale": (_plain("the time scale"), lambda x: 0 < x <= 1, "the time scale must lie in (0, 1], got {:g}"),
+}
+
+
+def checked(name: str, value: Any) -> float:
+    """Value of a setting; of one without a range of its own any finite number.
+
+    Raises SceneError for a value that is no number, or out of its range.
+    """
+    read, holds, refused = _CHECKS.get(name, (_plain(name), lambda x: True, ""))
+    checked = read(value)
+    if not (np.isfinite(checked) and holds(checked)):
+        raise SceneError(refused.format(checked))
+    return checked
 
 
 class Adjustable:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,24 @@ from palpate.errors import BodyError, Error, SceneError
 from palpate.scene import BuiltBody
 from palpate.scene.mistakes import located
 from palpate.scene.tables import SceneTables
-from palpate.simulation.connecting import largest_stiffness
+from palpate.simulation.connecting import largest_force, largest_stiffness
+
+
+def core_of(scene: SceneTables, bodies: Sequence[tuple[Any, ...]]) -> _native.SimulationCore:
+    """Make the native part of a simulation, from :func:`body_arguments` of its bodies; Error for what it refuses."""
+    device = scene.device
+    return _native.SimulationCore(
+        bodies,
+        [tool_arguments(scene, rank) for rank in range(len(scene.tools))],
+        (largest_force(scene), device.max_slew, device.ramp),
+        scene.view.strain_limit,
+        (device.rate, device.cpus, device.priority),
+    )
+
+
+def needs_moduli(scene: SceneTables) -> bool:
+    """Whether a tool of a scene follows the local law, which needs the elastic constants at the surfaces."""
+    return any(tool.contact == "local" for tool in scene.tools)
 
 
 def tool_arguments(scene: SceneTables, rank: int) -> tuple[Any, ...]:

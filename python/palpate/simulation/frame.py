@@ -11,7 +11,7 @@ import numpy as np
 from palpate.dynamics import Energy
 from palpate.equality import ComparedByValue
 from palpate.fields import DeformedSurface, Exportable, Result, ResultSource, placed, together
-from palpate.scene import BuiltBody
+from palpate.scene import BuiltBody, ToolTable
 from palpate.vectors import brief
 
 if TYPE_CHECKING:
@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 
 PERCENTILES = ("p50", "p99", "p999", "max")
 STATISTICS = ("ticks", "missed_deadlines", "missed_computing", "dropped_rows", "fault", "realtime", "refused")
+# From this thickness on, over the tool's radius, a layer on a table is as accurate as a block for the half-space of the
+# local law: docs/accuracy.md.
+THICK = 1.5
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -226,3 +229,18 @@ def contact_of(record: tuple[Any, ...], bodies: Sequence[BuiltBody]) -> Contact:
     nodes, place = bodies[body].green.surface_nodes[nodes], map(np.array, own)
     numbers.append(error or None)
     return Contact(tool, body, mode, *map(np.array, vectors), *flags, *numbers, nodes, np.array(weights), *place)
+
+
+def thin_places(contacts: Sequence[Contact], tools: Sequence[ToolTable], bodies: Sequence[BuiltBody]) -> list[bool]:
+    """For each tool whether it touches a part, under the local law, that is thinner than 1.5 of its radii."""
+    thin = [False] * len(tools)
+    for contact in contacts:
+        if contact.radius > 0 and not thin[contact.tool]:
+            green, thickness = bodies[contact.body].green, THICK * _size(tools[contact.tool])
+            thin[contact.tool] = green.is_thin_at(contact._own_point, contact._own_normal, thickness)
+    return thin
+
+
+def _size(tool: ToolTable) -> float:
+    """Radius of a tool, m; of an ellipsoid the smallest semi-axis."""
+    return min(tool.semi_axes) if tool.semi_axes is not None else tool.radius or 0.0

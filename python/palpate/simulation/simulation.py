@@ -12,7 +12,6 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -26,14 +25,13 @@ from palpate.fields import StrainMeasure, SurfaceStress
 from palpate.green import GreensFunction
 from palpate.scene import BodyMotion, BuiltBody, BuiltScene, Scene
 from palpate.simulation.about import about
-from palpate.simulation.arguments import body_arguments, tool_arguments
+from palpate.simulation.arguments import body_arguments, core_of, needs_moduli
 from palpate.simulation.changing import SceneEditing
-from palpate.simulation.connecting import assume_tables, connect, disconnect, largest_force, require_devices
-from palpate.simulation.frame import Contact, Frame, contact_of, frame_of
+from palpate.simulation.connecting import assume_tables, connect, disconnect, require_devices
+from palpate.simulation.frame import Contact, Frame, contact_of, frame_of, thin_places
 from palpate.simulation.recording import LOG_DTYPE, Recording, RecordingStatus, require_new_recording
 from palpate.simulation.scheduling import scheduled, start_loop
 from palpate.simulation.script import for_all_tools, grabs_of, orientations_of, positions_of, strike_of
-from palpate.simulation.thin import thin_places
 from palpate.simulation.warned import error_text, limit_text, refused_text
 from palpate.vectors import three_numbers
 
@@ -93,14 +91,8 @@ class Simulation(SceneEditing):
     ):
         built = scheduled(scene, cpus, priority)
         self.scene, self.bodies = built.scene, built.bodies
-        device, tools = self.scene.device, self.scene.tools
-        self._core = _native.SimulationCore(
-            [body_arguments(body, any(tool.contact == "local" for tool in tools)) for body in self.bodies],
-            [tool_arguments(self.scene, rank) for rank in range(len(tools))],
-            (largest_force(self.scene), device.max_slew, device.ramp),
-            self.scene.view.strain_limit,
-            (device.rate, device.cpus, device.priority),
-        )
+        local = needs_moduli(self.scene)
+        self._core = core_of(self.scene, [body_arguments(body, local) for body in self.bodies])
         assume_tables(self._core, self.scene)
         self._given = dict(devices or {})
         require_devices(self._given)
@@ -124,9 +116,7 @@ class Simulation(SceneEditing):
         self.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         self.stop()
 
     @property

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from palpate.body import Body
-from palpate.validation.verify.contact import balance, energy, friction, measures, pressing, shapes, sliding
+from palpate.validation.verify.contact import balance, energy, friction, measures, pressing, sliding
 from palpate.validation.verify.contact.loop import loop_of, sphere
 from palpate.validation.verify.contact.reference import body_on_table, sphere_press, top_nodes
 from palpate.validation.verify.solution import green_of, quiet_body
@@ -55,13 +55,13 @@ def test_a_force_five_per_cent_off_is_not_that_of_the_direct_solution():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("make", [shapes.finger_pad, shapes.flat_punch])
+@pytest.mark.parametrize("make", [pressing.finger_pad, pressing.flat_punch])
 def test_a_force_five_per_cent_off_is_not_that_of_the_shape(make):
-    body, shape, depth = body_on_table(shapes.BLOCK, (10, 10, 5), quadratic=True), make(), 5e-4
-    forces = shapes.pressed(body, shape, np.linspace(1e-4, depth, 5))
-    truth = shapes.direct(shapes.BLOCK, shape, depth)
+    body, shape, depth = body_on_table(pressing.BLOCK, (10, 10, 5), quadratic=True), make(), 5e-4
+    forces = pressing.pressed_shape(body, shape, np.linspace(1e-4, depth, 5))
+    truth = pressing.direct(pressing.BLOCK, shape, depth)
     # Closer than all shapes of the table have to be.
-    tolerance = 0.75 * shapes.TOLERANCE
+    tolerance = 0.75 * pressing.TOLERANCE
     assert abs(forces[-1] / truth - 1) <= tolerance
     for wrong in (1.05 * forces, -forces, stale(forces)):
         assert abs(wrong[-1] / truth - 1) > tolerance

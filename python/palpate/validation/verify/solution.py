@@ -12,7 +12,6 @@ import numpy as np
 from palpate.body import Body, Fixed, Loads, Material
 from palpate.dynamics import ModalBasis, modes
 from palpate.errors import LockingWarning, TouchWarning
-from palpate.fields import Interior
 from palpate.green import GreensFunction, precompute
 from palpate.mesh import TetMesh
 
@@ -45,11 +44,6 @@ def modes_of(body: Body, count: int) -> ModalBasis:
 def surface_response(body: Body) -> np.ndarray:
     """Displacements of the surface nodes under the body's loads, (s, 3) m."""
     return green_of(body, touch=body.mesh.surface_nodes[:1]).free_displacements
-
-
-def response(body: Body) -> np.ndarray:
-    """Displacements of all nodes under the body's loads, (n, 3) m."""
-    return Interior(body).extend(surface_response(body))
 
 
 def with_moved_supports(body: Body, motion: np.ndarray) -> Body:

@@ -15,7 +15,6 @@ from palpate.validation.verify.contact import (
     groove,
     large_strain,
     pressing,
-    shapes,
     sliding,
 )
 
@@ -41,7 +40,7 @@ BENCHMARKS = {
         Benchmark("felt", "Stiffness felt on a block", felt.felt_stiffness, slow=True),
         Benchmark("hertz", "A sphere in the tick, R = 10 mm, on a block of 10 kPa", pressing.hertz, slow=True),
         Benchmark("strain", "A sphere pressed deep, neo-Hookean, E = 10 kPa", large_strain.large_strain, slow=True),
-        Benchmark("shapes", "An ellipsoid and a rounded punch in the tick", shapes.shapes, slow=True),
+        Benchmark("shapes", "An ellipsoid and a rounded punch in the tick", pressing.shapes, slow=True),
         Benchmark("beside", "A sphere beside an edge, and beside another", beside.edges_and_neighbours, slow=True),
         Benchmark("groove", "A sphere in a groove: two places at once", groove.groove, slow=True),
         Benchmark("slide", "Sliding without friction at constant depth", sliding.ripple, slow=True),

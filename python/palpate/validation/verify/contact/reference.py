@@ -14,8 +14,8 @@ import numpy as np
 
 from palpate.body import Body, Material
 from palpate.mesh import TetMesh
-from palpate.validation.verify.contact.signorini import ContactProblem, Gap, Press
-from palpate.validation.verify.contact.tools import sphere
+from palpate.validation.verify.contact.signorini import ContactProblem, Press
+from palpate.validation.verify.contact.tools import Gap, sphere
 from palpate.validation.verify.grids import box, lattice, mapped
 from palpate.validation.verify.solution import green_of, quiet_body
 
