@@ -67,7 +67,7 @@ QUANTITIES = (
     (types.Direction, "three numbers"),
     (types.Acceleration, "three accelerations"),
     (types.ForceVector, "three forces"),
-    (tables.Quaternion, "four numbers"),
+    (tables.Orientation, "four numbers"),
 )
 WORDS = {
     str: "text",

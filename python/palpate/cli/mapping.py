@@ -146,8 +146,7 @@ def _palpate(
 ) -> tuple[StiffnessMap, Detection | None, list[Path]]:
     """Palpate, write, and forget what was kept for going on."""
     from palpate.palpation import compare, stiffness_map
-    from palpate.palpation.detection import has_several_materials
-    from palpate.palpation.files import DETECTION_FILES
+    from palpate.palpation.detection import DETECTION_FILES, has_several_materials
     from palpate.scene import Scene
 
     other = None if against is None else Scene.read(against)

@@ -148,7 +148,8 @@ def scene_with(scene: Scene, options: RunOptions) -> Scene:
 
 def _with_devices(scene: Scene, devices: Sequence[str]) -> Scene:
     """Scene whose first tools are moved by devices: of a table by name, or of a kind, where its own stood."""
-    from palpate.scene.devices import KINDS, device_change, device_ranks
+    from palpate.scene.devices import KINDS
+    from palpate.scene.tables import device_change, device_ranks
 
     if len(devices) > len(scene.tools):
         raise SceneError(f"--device was given {len(devices)} times, but the scene has {len(scene.tools)} of [[tool]]")

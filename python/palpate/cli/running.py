@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from palpate.green import BackgroundPrecompute
     from palpate.progress import Reporter
     from palpate.scene import BuiltScene, Scene
-    from palpate.viewer.preparing import Prepared
+    from palpate.viewer.live import Prepared
 
 Headless = Annotated[
     float | None,
@@ -249,10 +249,9 @@ def _view_early(file: Path, options: RunOptions, page: _Page, record: Path | Non
     from palpate.errors import ViewerError
     from palpate.input_file import require_file
     from palpate.progress import progress_reporter, reported_to
-    from palpate.viewer.live import open_viewer
-    from palpate.viewer.preparing import Preparation, Prepared, PreparingSession
+    from palpate.viewer.fields import read_map
+    from palpate.viewer.live import Preparation, Prepared, PreparingSession, open_viewer
     from palpate.viewer.server import ViewerServer
-    from palpate.viewer.surface_map import read_map
 
     require_body(file)
     require_places(record, None, (page.host, page.port))

@@ -1,16 +1,30 @@
-"""Devices defined by a program: subclasses of `Device` that read the tool's pose and render forces."""
+"""Devices defined by a program: subclasses of `Device` that read the tool's pose and render forces.
+
+A thread polls each of them. It may wait for the device and for the interpreter; the loop never does.
+"""
 
 from __future__ import annotations
 
+import atexit
+import contextlib
+import threading
+import time
+import warnings
 from abc import ABC, abstractmethod
 from typing import ClassVar
 
 import numpy as np
 
 from palpate import _native
-from palpate.devices.polling import PollingThread
-from palpate.devices.reading import DeviceLimits, Reading
-from palpate.errors import DeviceError
+from palpate.devices.reading import DeviceLimits, Reading, reading_error
+from palpate.errors import DeviceError, DeviceWarning
+from palpate.vectors import number
+
+# How long a device may take to open and give its first reading, and to end its last call, s.
+OPENING, CLOSING = 10.0, 2.0
+# Time between two attempts of a device that has failed, s.
+REOPEN_SECONDS = 0.1
+LOWEST_RATE, HIGHEST_RATE = 50.0, 10_000.0
 
 
 class Device(ABC):
@@ -82,3 +96,147 @@ class Device(ABC):
         polling, self._polling = self._polling, None
         if polling is not None:
             polling.stop()
+
+
+class PollingThread:
+    """A device of a program, opened and polled on a thread of its own from :meth:`start` to :meth:`stop`, once.
+
+    Parameters
+    ----------
+    device
+        The device.
+    rate
+        How often it is polled unless it says so itself, Hz.
+
+    Attributes
+    ----------
+    name
+        What a person knows it by.
+    failure
+        Why it failed last, in one line; None if it has not.
+
+    Raises
+    ------
+    DeviceError
+        A rate out of range, or limits that are none.
+
+    """
+
+    def __init__(self, device: Device, rate: float):
+        self.name = device.name or type(device).__name__
+        if not isinstance(device.limits, DeviceLimits):
+            kind = type(device.limits).__name__
+            raise DeviceError(f"{self.name}: limits must be a palpate.DeviceLimits, got {kind}")
+        rate = number(rate if device.rate is None else device.rate, f"{self.name}: rate", DeviceError)
+        if not LOWEST_RATE <= rate <= HIGHEST_RATE:
+            raise DeviceError(f"{self.name}: rate must be {LOWEST_RATE:g} to {HIGHEST_RATE:g} Hz, got {rate:g}")
+        self.failure: str | None = None
+        self._device = device
+        self._period = 1.0 / rate
+        self._ending, self._ready = threading.Event(), threading.Event()
+        self._thread: threading.Thread | None = None
+        self._refusal: DeviceError | None = None
+
+    def start(self) -> _native.OpenedDevice:
+        """Open the device and wait for its first reading; what a loop takes.
+
+        Raises DeviceError, in one line, for what `open` or the first `read` raised, or because they took too long.
+        """
+        native = _native.ProgrammedDevice(self.name, self._device.limits.arguments, 1.0 / self._period)
+        self._thread = threading.Thread(
+            target=self._run, args=(native,), name=f"palpate-device {self.name}", daemon=True
+        )
+        # A program that ends without a word leaves no force behind: a daemon is not waited for.
+        atexit.register(self.stop)
+        self._thread.start()
+        if not self._ready.wait(OPENING):
+            self._refusal = DeviceError(f"{self.name}: open and the first read took more than {OPENING:g} s")
+        if self._refusal is not None:
+            self.stop()
+            raise self._refusal
+        return native.opened()
+
+    def stop(self) -> None:
+        """Put out zero, close the device and end the thread; a call of it that does not return is left behind."""
+        atexit.unregister(self.stop)
+        self._ending.set()
+        thread, self._thread = self._thread, None
+        if thread is None:
+            return
+        thread.join(CLOSING)
+        if thread.is_alive():
+            self._warn(
+                "a method of the device does not return: it may still be open, with its last force: switch it off"
+            )
+
+    def _run(self, native: _native.ProgrammedDevice) -> None:
+        """All that the thread does; nothing is raised out of it."""
+        opened, message = self._call("open", self._device.open)
+        if message is None:
+            message = self._read(native)
+        if message is not None:
+            self._refusal = DeviceError(message)
+        self._ready.set()
+        try:
+            if message is None:
+                self._poll(native)
+        finally:
+            if opened:
+                with contextlib.suppress(Exception):
+                    self._device.write(np.zeros(3), np.zeros(3))
+                _, message = self._call("close", self._device.close)
+                if message is not None:
+                    self._warn(message)
+
+    def _poll(self, native: _native.ProgrammedDevice) -> None:
+        """Read and write on a grid of deadlines until it is asked to end; what has failed is tried again at leisure."""
+        due, failed = time.monotonic(), False
+        while not self._ending.is_set():
+            message = self._write(native) or self._read(native)
+            if message is not None:
+                self.failure = message
+                native.fail()
+                if not failed:
+                    self._warn(message)
+                with contextlib.suppress(Exception):
+                    self._device.write(np.zeros(3), np.zeros(3))
+            failed = message is not None
+            now = time.monotonic()
+            # Deadlines that have passed meanwhile are left out.
+            due = max(due + self._period, now - self._period) if not failed else now + REOPEN_SECONDS
+            if due > now:
+                time.sleep(due - now)
+
+    def _read(self, native: _native.ProgrammedDevice) -> str | None:
+        """Publish a reading; why there is none."""
+        reading, message = self._call("read", self._device.read)
+        if message is not None:
+            return message
+        if reading is None:
+            native.publish_absent()
+            return None
+        with contextlib.suppress(TypeError, ValueError, AttributeError, OverflowError):
+            how = reading.orientation, reading.velocity, reading.angular_velocity, reading.buttons
+            if native.publish(reading.position, *how):
+                return None
+        return f"{self.name}.read {reading_error(reading) or 'returned a reading that cannot be used'}"
+
+    def _write(self, native: _native.ProgrammedDevice) -> str | None:
+        """Put out the latest wrench; why it was not."""
+        force, torque, _ = native.wrench()
+        return self._call("write", self._device.write, np.array(force), np.array(torque))[1]
+
+    def _call(self, what: str, call, *arguments):
+        """Call a method of the device: what it returned, True for nothing, and its mistake in one line."""
+        try:
+            returned = call(*arguments)
+        except Exception as error:
+            lines = str(error).strip().splitlines()
+            detail = f": {lines[0]}" if lines else ""
+            return None, f"{self.name}.{what} raised {type(error).__name__}{detail}"
+        return (returned if what == "read" else True), None
+
+    def _warn(self, message: str) -> None:
+        # A filter that makes warnings errors must not end the thread, which still has a force to take back.
+        with contextlib.suppress(DeviceWarning):
+            warnings.warn(message, DeviceWarning, stacklevel=2)

@@ -1,8 +1,9 @@
-"""Newmark's scheme: a body in motion under given forces."""
+"""Newmark's scheme: a body in motion under given forces, its damping and its energies."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,14 +11,82 @@ from palpate import _native, units
 from palpate.body import Body
 from palpate.dynamics.basis import ModalBasis, basis_key
 from palpate.dynamics.basis import modes as compute_modes
-from palpate.dynamics.energy import Energy
 from palpate.dynamics.matrices import Matrices, native
 from palpate.dynamics.residual import Residual
+from palpate.equality import ComparedByValue
 from palpate.errors import BodyError
 from palpate.units import brief_repr
 from palpate.vectors import number, number_array, three_numbers
 
 METHODS = ("modal", "sparse", "dense", "exponential")
+
+
+@dataclass(frozen=True, eq=False)
+class Energy(ComparedByValue):
+    """Energies of a body in motion, J: numbers, or arrays over the ticks of a recording.
+
+    Attributes
+    ----------
+    kinetic, strain
+        `v M v / 2` and `u K u / 2` now.
+    coupling
+        Of the springs between tools and body now; zero where forces are given.
+    dissipated
+        Taken out by damping since the start.
+    work
+        Done by forces, tools and strikes since the start.
+
+    """
+
+    kinetic: float | np.ndarray
+    strain: float | np.ndarray
+    coupling: float | np.ndarray
+    dissipated: float | np.ndarray
+    work: float | np.ndarray
+
+    @property
+    def total(self) -> float | np.ndarray:
+        """Energy of the body and its couplings now, `kinetic + strain + coupling`, J."""
+        return self.kinetic + self.strain + self.coupling
+
+
+def rayleigh_from_ratios(xi1: float, f1: float, xi2: float, f2: float) -> tuple[float, float]:
+    """Factors of `B = a M + b K` that give two frequencies their damping ratios.
+
+    A mode of angular frequency `w` has the ratio `xi = a / (2 w) + b w / 2`; two of them are two equations for a and b.
+
+    Parameters
+    ----------
+    xi1, f1
+        Ratio to critical damping at the frequency f1, Hz.
+    xi2, f2
+        The same at another frequency.
+
+    Returns
+    -------
+    tuple[float, float]
+        a in 1/s and b in s.
+
+    Raises
+    ------
+    BodyError
+        Equal or non-positive frequencies, or ratios so far apart that a factor would be negative.
+
+    """
+    values = (xi1, f1, xi2, f2)
+    if not all(np.isfinite(v) for v in values) or min(f1, f2) <= 0 or f1 == f2 or min(xi1, xi2) < 0:
+        raise BodyError(f"two different positive frequencies and two ratios of at least 0 are needed, got {values}")
+    w1, w2 = 2 * np.pi * f1, 2 * np.pi * f2
+    difference = w2**2 - w1**2
+    a = 2 * w1 * w2 * (xi1 * w2 - xi2 * w1) / difference
+    b = 2 * (xi2 * w2 - xi1 * w1) / difference
+    if min(a, b) < 0:
+        low, high = sorted((f1 / f2, f2 / f1))
+        raise BodyError(
+            f"ratios of {xi1} at {f1} Hz and {xi2} at {f2} Hz need a negative factor, which would add energy "
+            f"at other frequencies: the quotient of the ratios must lie between {low:.4g} and {high:.4g}"
+        )
+    return float(a), float(b)
 
 
 class Newmark:

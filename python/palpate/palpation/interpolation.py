@@ -15,32 +15,25 @@ NORMALS, KNOWN = 1.2, 1.6
 NEIGHBOURS = 24
 
 
-class SurfaceField:
-    """A field that is known at places about a spacing, m, apart.
+def joined(points: np.ndarray, normals: np.ndarray, spacing: float) -> np.ndarray:
+    """Points (n, 3), m, and unit normals (n, 3) as places (n, 6), whose distances count in spacings, m."""
+    return np.hstack([points / spacing, NORMALS * normals])
 
-    The ``points`` (p, 3), m, have unit ``normals`` (p, 3). The ``values`` (p,) are NaN where nothing is known.
+
+def interpolated(asked: np.ndarray, places: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Values (n,) at places (n, 6) of :func:`joined`, from those (p,) at others (p, 6), NaN where nothing is known.
+
+    NaN where none is near.
     """
+    from scipy.interpolate import RBFInterpolator
+    from scipy.spatial import cKDTree
 
-    def __init__(self, points: np.ndarray, normals: np.ndarray, values: np.ndarray, spacing: float):
-        known = np.isfinite(values)
-        self._spacing = spacing
-        self._places, self._values = self._joined(points[known], normals[known]), values[known]
-
-    def at(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
-        """Values (n,) at points (n, 3), m, with normals (n, 3); NaN where none is near."""
-        from scipy.interpolate import RBFInterpolator
-        from scipy.spatial import cKDTree
-
-        values = np.full(len(points), np.nan)
-        if len(self._values) == 0:
-            return values
-        asked = self._joined(points, normals)
-        near = cKDTree(self._places).query(asked)[0] < KNOWN
+    known = np.isfinite(values)
+    found = np.full(len(asked), np.nan)
+    if known.any():
+        near = cKDTree(places[known]).query(asked)[0] < KNOWN
         if near.any():
-            neighbours = min(NEIGHBOURS, len(self._values))
-            fit = RBFInterpolator(self._places, self._values, neighbours, kernel="linear", degree=0)
-            values[near] = fit(asked[near])
-        return values
-
-    def _joined(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
-        return np.hstack([points / self._spacing, NORMALS * normals])
+            neighbours = min(NEIGHBOURS, int(known.sum()))
+            fit = RBFInterpolator(places[known], values[known], neighbours, kernel="linear", degree=0)
+            found[near] = fit(asked[near])
+    return found

@@ -8,7 +8,7 @@ import numpy as np
 
 from palpate.equality import ComparedByValue
 from palpate.mesh.triangles import node_normals
-from palpate.palpation.interpolation import SurfaceField
+from palpate.palpation.interpolation import interpolated, joined
 from palpate.palpation.sides import SurfaceShape
 from palpate.scene import BuiltScene
 
@@ -70,7 +70,8 @@ class MapRecord(ComparedByValue):
         ``values`` (p,) takes other values at the points in its place.
         """
         known = self.stiffness if values is None else values
-        return SurfaceField(self.points, self.normals, known, self.spacing).at(points, normals)
+        places = joined(self.points, self.normals, self.spacing)
+        return interpolated(joined(points, normals, self.spacing), places, known)
 
     def surfaces(self) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """Of each body, in the scene: positions (s, 3), m, normals (s, 3), and triangles (t, 3) as rows of them."""
@@ -107,14 +108,3 @@ class Nodule(ComparedByValue):
     ratio: float
     difference: float
     half_width: float
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class DetectionRecord(ComparedByValue):
-    """What a comparison holds; :class:`palpate.palpation.Detection` describes each field."""
-
-    found: MapRecord
-    plain: MapRecord
-    ratio: np.ndarray
-    difference: np.ndarray
-    nodules: tuple[Nodule, ...]

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from pydantic import model_validator
 
 from palpate.body import Body, Loads, gravity_error, parse
-from palpate.errors import BodyError
-from palpate.scene.table import Acceleration, ForceVector, SignedPressure, Table
+from palpate.scene.table import Acceleration, ForceVector, SignedPressure, Table, explained
 
 
 class LoadTable(Table):
@@ -45,10 +44,8 @@ class LoadTable(Table):
                 "a force is spread over a part of the surface, on = '...', or acts on each of nodes = [...]"
             )
         if self.on is not None:
-            try:
+            with explained():
                 parse(self.on)
-            except BodyError as error:
-                raise ValueError(str(error)) from None
         return self
 
     def check(self, body: Body) -> None:

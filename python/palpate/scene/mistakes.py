@@ -25,9 +25,6 @@ WORDS = {
     "tuple": "a list of numbers",
 }
 
-# Keys of earlier versions, and what stands for them.
-GONE = {"repair": "leave it out, for a surface that is open or crosses itself is wrapped without it (mesher = 'wrap')"}
-
 Place = Sequence[str | int]
 # A key, bare or in quotes, or several with dots between them.
 _KEY = r"""(?:[\w-]+|"[^"]*"|'[^']*')"""
@@ -51,8 +48,6 @@ def explain(path: Path, text: str, error: ValidationError, model: type[BaseModel
     where = ".".join(keys)
     at = located(path, text, place)
     if first["type"] == "extra_forbidden":
-        if keys[-1] in GONE:
-            return f"{at}: unknown key '{where}': {GONE[keys[-1]]}"
         known = _known_keys(model, keys[:-1])
         near = difflib.get_close_matches(keys[-1], known, 1)
         hint = f"did you mean '{near[0]}'?" if near else f"known are {', '.join(known)}"

@@ -8,9 +8,20 @@ import numpy as np
 from pydantic import model_validator
 
 from palpate.body import Material
-from palpate.errors import BodyError, MeshError
+from palpate.errors import MeshError
 from palpate.mesh import TetMesh, shapes
-from palpate.scene.table import Density, Direction, Length, Point, PoissonsRatio, Pressure, Table, is_whole, one_of
+from palpate.scene.table import (
+    Density,
+    Direction,
+    Length,
+    Point,
+    PoissonsRatio,
+    Pressure,
+    Table,
+    explained,
+    is_whole,
+    one_of,
+)
 
 # The solid of each shape, and the keys that place it.
 SHAPES = {
@@ -58,10 +69,8 @@ class MaterialTable(Table):
 
     @model_validator(mode="after")
     def _one_material(self) -> MaterialTable:
-        try:
+        with explained():
             self.material()
-        except BodyError as error:
-            raise ValueError(str(error)) from None
         return self
 
     def material(self) -> Material:
@@ -118,10 +127,8 @@ class PlaceTable(Table):
     def solid(self) -> shapes.Shape:
         """Solid of a shape."""
         kind, keys = SHAPES[str(self.shape)]
-        try:
+        with explained():
             return kind(*(getattr(self, key) for key in keys))
-        except MeshError as error:
-            raise ValueError(str(error)) from None
 
     def elements(self, mesh: TetMesh) -> np.ndarray:
         """Mask of the elements (m,) of this region; MeshError if there are none."""

@@ -8,10 +8,9 @@ import numpy as np
 from pydantic import Discriminator, Tag, field_validator
 
 from palpate.body import SurfaceRegion, parse
-from palpate.errors import BodyError
 from palpate.mesh import TetMesh
 from palpate.scene.regions import PlaceTable
-from palpate.scene.table import Table, is_whole, one_of
+from palpate.scene.table import Table, explained, is_whole, one_of
 
 
 def _kind(value: Any) -> str:
@@ -55,10 +54,8 @@ class TouchTable(Table):
     def _readable(cls, area: Any) -> Any:
         # A word alone is the name of a region, of which only the mesh file knows.
         if isinstance(area, str) and any(sign in area for sign in "<>="):
-            try:
+            with explained():
                 parse(area)
-            except BodyError as error:
-                raise ValueError(str(error)) from None
         return area
 
     def areas(self, mesh: TetMesh) -> dict[str, SurfaceRegion | None]:

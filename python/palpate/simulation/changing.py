@@ -15,10 +15,10 @@ from palpate.devices import Device
 from palpate.errors import SceneError, SimulationError
 from palpate.green import GreensFunction, precompute
 from palpate.scene import BuiltBody, BuiltScene, Scene, ToolTable
-from palpate.scene.devices import KINDS, device_change, tables_of_tools, without_devices
+from palpate.scene.devices import KINDS
 from palpate.scene.mistakes import reason_of
 from palpate.scene.series import with_series_of_tools, with_stored_series
-from palpate.scene.tables import BodyTable, SceneTables
+from palpate.scene.tables import BodyTable, SceneTables, device_change, tables_of_tools, without_devices
 from palpate.simulation.arguments import body_arguments, needs_moduli, tool_arguments
 from palpate.simulation.connecting import connect_tool, require_devices, warn_if_limited
 from palpate.simulation.series_growth import SeriesGrowth
@@ -267,7 +267,7 @@ def _placed(
     try:
         BodyTable(model="beam", position=place, orientation=turned)
     except ValidationError as error:
-        raise SceneError(reason_of(error)) from None
+        raise SceneError(f"a body's orientation: {reason_of(error)}") from None
     return place, turned
 
 

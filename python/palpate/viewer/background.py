@@ -1,4 +1,4 @@
-"""Long computations on threads beside the event loop of the server."""
+"""A long computation on a thread beside the event loop of the server."""
 
 from __future__ import annotations
 
@@ -6,31 +6,11 @@ import asyncio
 import contextlib
 import threading
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from palpate.errors import ViewerError
 
 Result = TypeVar("Result")
-
-
-class Worker:
-    """One thread that does everything a session is asked for, one thing after the other.
-
-    Frames, settings and commands touch the same running simulation; a single thread keeps them in order without locks,
-    and the event loop only waits for answers.
-    """
-
-    def __init__(self) -> None:
-        self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="palpate-session")
-
-    async def call(self, work: Callable[..., Result], *arguments: Any) -> Result:
-        """Do ``work(*arguments)`` there, and return its result or raise its error."""
-        return await asyncio.get_running_loop().run_in_executor(self._thread, work, *arguments)
-
-    def close(self) -> None:
-        """Do what was asked for, and end the thread."""
-        self._thread.shutdown()
 
 
 class CancellableTask:

@@ -6,6 +6,7 @@ import ipaddress
 import socket
 from collections.abc import Mapping
 from importlib import resources
+from pathlib import Path
 
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
@@ -25,17 +26,9 @@ def load_pages() -> dict[str, tuple[str, bytes]]:
 
     Raises ViewerError for a package built without the page.
     """
-    root = resources.files("palpate.viewer") / "static"
-    pages: dict[str, tuple[str, bytes]] = {}
-    folders = [("", root)] if root.is_dir() else []
-    while folders:
-        prefix, folder = folders.pop()
-        for entry in folder.iterdir():
-            path = f"{prefix}/{entry.name}"
-            if entry.is_dir():
-                folders.append((path, entry))
-            elif (kind := TYPES.get("." + entry.name.rpartition(".")[2])) is not None:
-                pages[path] = (kind, entry.read_bytes())
+    root = Path(str(resources.files("palpate.viewer") / "static"))
+    files = (file for file in root.rglob("*") if file.suffix in TYPES)
+    pages = {f"/{file.relative_to(root).as_posix()}": (TYPES[file.suffix], file.read_bytes()) for file in files}
     if "/index.html" not in pages:
         raise ViewerError("the viewer's page is not built: run 'make viewer' (it needs Node), or use --headless")
     pages["/"] = pages["/index.html"]

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Coroutine
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
 from palpate.errors import Error, ViewerError
-from palpate.viewer.background import CancellableTask, Worker
+from palpate.viewer.background import CancellableTask
 from palpate.viewer.client import Client
 from palpate.viewer.computing import Computing
 from palpate.viewer.session import Session
@@ -34,7 +35,8 @@ class SessionHost:
         self._computing = Computing(session.growing)
         self._computing.begin()
         session.start()
-        self._worker = Worker()
+        # A single thread keeps frames, settings and commands of the running simulation in order without locks.
+        self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="palpate-session")
         self._clients: list[Client] = []
         self._controller: Client | None = None
         self._building: CancellableTask | None = None
@@ -72,12 +74,12 @@ class SessionHost:
         return self._session
 
     async def call(self, work: Callable[..., Result], *arguments: Any) -> Result:
-        """Do ``work(*arguments)`` on the worker's thread."""
-        return await self._worker.call(work, *arguments)
+        """Do ``work(*arguments)`` on the worker's thread, and return its result or raise its error."""
+        return await asyncio.get_running_loop().run_in_executor(self._worker, work, *arguments)
 
     async def with_session(self, work: Callable[[Any], Result]) -> Result:
         """Do ``work(session)`` on the worker's thread, with the session that is shown when its turn comes."""
-        return await self._worker.call(lambda: work(self._session))
+        return await self.call(lambda: work(self._session))
 
     def exchange(self, session: Shown) -> None:
         """Put a session in the place of the one that runs. If it does not start, the one before runs again.

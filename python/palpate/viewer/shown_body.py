@@ -29,11 +29,6 @@ class ShownBody:
         of_element = np.zeros(0, dtype=np.int64) if built.body is None else regions_of(built.body)[1]
         return cls(built, fields, drawn_surface(built, of_element), poissons_ratio)
 
-    @property
-    def extent(self) -> float:
-        """Longest side of the body, m."""
-        return float(self.built.green.extents.max())
-
     def picture(self, name: str, displacements: np.ndarray, cutaway: bool, full_scale: float | None) -> Picture:
         """Field of a pose at the vertices that are drawn, or at all nodes where the body is cut open."""
         whole = self.drawn.is_whole
