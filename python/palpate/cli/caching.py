@@ -26,8 +26,7 @@ def cache_list() -> None:
     """
     from datetime import datetime
 
-    from palpate.cache import cache_directory, cached_files
-    from palpate.cache_limit import cache_limit
+    from palpate.cache import cache_directory, cache_limit, cached_files
 
     files = cached_files()
     width = max((len(file.name) for file in files), default=0)
@@ -53,8 +52,7 @@ def cache_limit_command(
 
     Example: palpate cache limit 20GB
     """
-    from palpate.cache import cached_files
-    from palpate.cache_limit import cache_limit, set_cache_limit
+    from palpate.cache import cache_limit, cached_files, set_cache_limit
 
     if size is not None:
         set_cache_limit(None if size == "default" else size)

@@ -280,8 +280,7 @@ def _view_early(file: Path, options: RunOptions, page: _Page, record: Path | Non
 
 def _print_cache_use() -> None:
     """Print what stays in the cache of what was prepared."""
-    from palpate.cache import cached_files
-    from palpate.cache_limit import cache_limit, kept_by_this_process
+    from palpate.cache import cache_limit, cached_files, kept_by_this_process
 
     size = kept_by_this_process()
     if size:

@@ -5,22 +5,3 @@ from palpate.devices.listing import FoundDevice, Listing, Obstacle, kinds, liste
 from palpate.devices.reading import DeviceLimits, Reading
 from palpate.devices.self_check import DIRECTIONS, Checked, Push, SelfCheck, Watched
 from palpate.devices.usb import UsbDevice, usb_devices
-
-__all__ = [
-    "DIRECTIONS",
-    "Checked",
-    "Device",
-    "DeviceLimits",
-    "FoundDevice",
-    "Listing",
-    "Obstacle",
-    "Push",
-    "Reading",
-    "SelfCheck",
-    "UsbDevice",
-    "Watched",
-    "kinds",
-    "listed",
-    "listings",
-    "usb_devices",
-]

@@ -2,5 +2,3 @@
 
 from palpate.dynamics.basis import ModalBasis, modes
 from palpate.dynamics.newmark import Energy, Newmark, rayleigh_from_ratios
-
-__all__ = ["Energy", "ModalBasis", "Newmark", "modes", "rayleigh_from_ratios"]

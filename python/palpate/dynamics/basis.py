@@ -15,8 +15,7 @@ import scipy
 from palpate import _native
 from palpate.atomic import destination
 from palpate.body import Body, description
-from palpate.cache import cache_directory
-from palpate.cache_limit import hold, make_room
+from palpate.cache import cache_directory, hold, make_room
 from palpate.dynamics.matrices import Matrices, start_vector
 from palpate.errors import BodyError, StoreError
 from palpate.leftovers import remove_leftovers

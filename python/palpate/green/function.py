@@ -16,7 +16,7 @@ import numpy as np
 from palpate import _native, units
 from palpate.atomic import destination
 from palpate.body import Body, description, problem_arrays
-from palpate.cache_limit import hold
+from palpate.cache import hold
 from palpate.errors import BodyError, StoreError, TouchWarning
 from palpate.fields import STRAIN_LIMIT, ElementStrain, StrainMeasure, StressRecovery, SurfaceStrain
 from palpate.green.answer import Answer, Touch

@@ -13,12 +13,10 @@ import numpy as np
 from palpate import _native
 from palpate.atomic import destination
 from palpate.body import Body, SurfaceRegion, description, problem_arrays, surface_region
-from palpate.cache import cache_directory
-from palpate.cache_limit import make_room
+from palpate.cache import cache_directory, make_room
 from palpate.errors import BodyError, StoreError
-from palpate.green.disk import DiskUse, require_room
 from palpate.green.function import GreensFunction
-from palpate.green.memory import allowed_memory, available_memory
+from palpate.green.resources import DiskUse, allowed_memory, available_memory, require_room
 from palpate.input_file import require_writable
 from palpate.leftovers import remove_leftovers
 from palpate.units import brief_repr

@@ -7,5 +7,3 @@ connection with bounded memory, ``server`` the thread that serves them all, ``li
 from palpate.openigtlink.axes import Axes
 from palpate.openigtlink.link import Link
 from palpate.openigtlink.server import LinkServer
-
-__all__ = ["Axes", "Link", "LinkServer"]

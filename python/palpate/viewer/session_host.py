@@ -8,12 +8,11 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
 from palpate.errors import Error, ViewerError
-from palpate.viewer.background import CancellableTask
 from palpate.viewer.client import Client
 from palpate.viewer.computing import Computing
 from palpate.viewer.session import Session
 from palpate.viewer.setup_session import SetupSession
-from palpate.viewer.status import StatusReporter, error_message, status
+from palpate.viewer.status import CancellableTask, StatusReporter, error_message, status
 
 Shown = Session | SetupSession
 Result = TypeVar("Result")

@@ -20,14 +20,13 @@ from palpate.scene import Scene
 from palpate.scene.build import unsolved_body
 from palpate.scene.early import Expected
 from palpate.scene.touch import TouchTable
-from palpate.viewer.background import CancellableTask
 from palpate.viewer.computing import mask_of
 from palpate.viewer.messages import whole
 from palpate.viewer.session import Session
 from palpate.viewer.session_host import SessionHost
 from palpate.viewer.setup_body import SetupBody
 from palpate.viewer.setup_session import SetupSession
-from palpate.viewer.status import error_message, status
+from palpate.viewer.status import CancellableTask, error_message, status
 from palpate.viewer.upload import ENDINGS, MAX_FILE, MAX_PART, Upload
 
 # Where a mistake stands in a scene file: path, line, and table.

@@ -2,5 +2,3 @@
 
 from palpate.validation.verify.check import Benchmark, Check, Outcome
 from palpate.validation.verify.table import BENCHMARKS, chosen
-
-__all__ = ["BENCHMARKS", "Benchmark", "Check", "Outcome", "chosen"]
