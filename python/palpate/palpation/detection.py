@@ -32,6 +32,7 @@ from palpate.scene import BuiltScene, Scene
 from palpate.scene.regions import MaterialTable, RegionTable
 from palpate.scene.tables import SceneTables
 from palpate.simulation import Simulation
+from palpate.units import count_text
 
 if TYPE_CHECKING:
     import meshio
@@ -71,7 +72,7 @@ class Detection(ComparedByValue):
     nodules: tuple[Nodule, ...]
 
     def __repr__(self) -> str:
-        count = f"{len(self.nodules)} nodule{'' if len(self.nodules) == 1 else 's'}"
+        count = count_text(len(self.nodules), "nodule")
         known = self.ratio[np.isfinite(self.ratio)]
         range_text = f", ratios {known.min():.3g} to {known.max():.3g}" if len(known) else ""
         return f"Detection({count}{range_text})"

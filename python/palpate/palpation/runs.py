@@ -43,10 +43,7 @@ def probe(built: BuiltScene) -> BuiltScene:
 
 
 def run_all(
-    simulation: Simulation,
-    paths: Sequence[Path3D],
-    partial: Path | None,
-    progress: bool | Callable[[int, int], None],
+    simulation: Simulation, paths: Sequence[Path3D], partial: Path | None, progress: bool | Callable[[int, int], None]
 ) -> tuple[list[Run], int]:
     """Run each path from a body at rest; also report how many runs were known already.
 

@@ -16,12 +16,19 @@ from palpate.fields import write_result
 from palpate.figures import write_figure
 from palpate.palpation import pictures
 from palpate.palpation.files import XYZ, surface_mesh, write_columns
-from palpate.palpation.press import FORCE_LIMIT, NO_CONTACT, OTHER_PLACE, STRAIN_LIMIT, Measured
+from palpate.palpation.press import (
+    FORCE_LIMIT,
+    NO_CONTACT,
+    OTHER_PLACE,
+    STRAIN_LIMIT,
+    Measured,
+    press_paths,
+    read_presses,
+)
 from palpate.palpation.protocol import Protocol, Sites, sample_sites, sites_at_points
-from palpate.palpation.reading import press_paths, read_presses, read_strokes
 from palpate.palpation.records import MapRecord
 from palpate.palpation.runs import probe, run_all
-from palpate.palpation.strokes import Track, strokes_on
+from palpate.palpation.strokes import Track, read_strokes, strokes_on
 from palpate.scene import BuiltScene, Scene
 from palpate.simulation import Simulation
 

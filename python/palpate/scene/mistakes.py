@@ -10,7 +10,7 @@ from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from palpate.units import brief_repr
+from palpate.units import brief_repr, count_text
 
 # What pydantic adds to the place of a mistake in a value that may be of several kinds.
 UNION_MEMBERS = {"str", "int", "list[int]", "bool", "[place]", "[text]", "[nodes]"}
@@ -74,15 +74,11 @@ def _expected(mistake: Mapping[str, Any], key: str) -> str:
     if kind in ("model_type", "model_attributes_type", "dict_type"):
         return f"must be a table: write [{key}] on a line of its own, and its keys below it"
     if kind == "too_short":
-        return f"needs at least {context['min_length']} {_entries(context['min_length'])}"
+        return f"needs at least {count_text(context['min_length'], 'entry', 'entries')}"
     if kind == "too_long":
-        return f"takes at most {context['max_length']} {_entries(context['max_length'])}"
+        return f"takes at most {count_text(context['max_length'], 'entry', 'entries')}"
     expectation = mistake["msg"].removeprefix("Input should be ").removeprefix("a valid ").split(", unable")[0]
     return f"must be {WORDS.get(expectation, expectation)}"
-
-
-def _entries(count: int) -> str:
-    return "entry" if count == 1 else "entries"
 
 
 def _value_text(value: Any) -> str:

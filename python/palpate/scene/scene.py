@@ -152,9 +152,7 @@ class Scene(SceneTables):
         return with_series(build(self, progress, None, announce=announce, dask=dask), progress, dask)
 
     def build_first(
-        self,
-        progress: bool | Callable[[int, int], None] = True,
-        announce: Callable[[Expected], None] | None = None,
+        self, progress: bool | Callable[[int, int], None] = True, announce: Callable[[Expected], None] | None = None
     ) -> tuple[BuiltScene, dict[int, BackgroundPrecompute]]:
         """Build the part that is touched first, and compute the rest in other processes.
 

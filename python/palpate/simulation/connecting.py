@@ -8,14 +8,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from palpate import _native
-from palpate.devices import Device
+from palpate.devices import Device, DeviceLimits
 from palpate.errors import DeviceError, DeviceWarning
 from palpate.scene import DeviceTable
 from palpate.scene.tables import SceneTables
-
-INFINITE = float("inf")
-# Force, torque, stiffness, damping, damping of rotation, own damping, delay, speed, rate: nothing is limited.
-UNLIMITED = (INFINITE, INFINITE, INFINITE, INFINITE, INFINITE, None, 0.0, None, None)
 
 
 def require_devices(devices: Mapping[int, Device]) -> None:
@@ -40,7 +36,8 @@ def assume_tables(core: _native.SimulationCore, scene: SceneTables) -> None:
     """Keep each tool to the force of its own device, where devices differ."""
     forces, most = [table.max_force / table.force_scale for table in _tables(scene)], largest_force(scene)
     if any(force != most for force in forces):
-        _native.assume_devices(core, [(force, *UNLIMITED[1:]) for force in forces])
+        limits = [DeviceLimits(max_force=force, max_speed=None) for force in forces]
+        _native.assume_devices(core, [limit.arguments for limit in limits])
 
 
 def assume_recorded(core: _native.SimulationCore, about: Mapping[str, str]) -> None:
@@ -83,9 +80,9 @@ def connect_tool(core: _native.SimulationCore, scene: SceneTables, tool: int, gi
         opened = _native.OpenedDevice(table.kind, table.id, table.address, table.library)
     else:
         opened = given.open_for_loop(scene.device.rate)
-    limits = (table.max_force, INFINITE, table.max_stiffness, *UNLIMITED[3:])
+    limits = DeviceLimits(max_force=table.max_force, max_stiffness=table.max_stiffness, max_speed=None)
     try:
-        _native.connect(core, tool, opened, workspace_of(table), limits)
+        _native.connect(core, tool, opened, workspace_of(table), limits.arguments)
     except BaseException:
         if given is not None:
             given.close_for_loop()

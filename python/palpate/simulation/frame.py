@@ -12,6 +12,7 @@ from palpate.dynamics import Energy
 from palpate.equality import ComparedByValue
 from palpate.fields import DeformedSurface, Exportable, Result, ResultSource, placed, together
 from palpate.scene import BuiltBody, ToolTable
+from palpate.units import count_text
 from palpate.vectors import brief
 
 if TYPE_CHECKING:
@@ -169,7 +170,7 @@ class Frame(ComparedByValue, Exportable):
 
     def __repr__(self) -> str:
         forces = ", ".join(brief(force) for force in self.forces)
-        contacts = f"{len(self.contacts)} contact{'' if len(self.contacts) == 1 else 's'}"
+        contacts = count_text(len(self.contacts), "contact")
         return f"Frame({self.time:.3f} s, {contacts}, forces on the devices {forces} N)"
 
     def to_meshio(self) -> meshio.Mesh:

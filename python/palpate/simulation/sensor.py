@@ -15,7 +15,7 @@ from palpate.scene import BuiltScene, Scene, ToolTable
 from palpate.scene.tables import SceneTables
 from palpate.simulation.script import require_unit_length
 from palpate.simulation.simulation import Simulation
-from palpate.units import brief_repr
+from palpate.units import brief_repr, count_text
 from palpate.vectors import number_array
 
 POSE, WRENCH, CONTACT = 7, 6, 21
@@ -117,8 +117,7 @@ class Sensor:
         self._raw: dict[str, Any] | None = None
 
     def __repr__(self) -> str:
-        tools = len(self._scene.tools)
-        return f"Sensor({self._scene.name}, {self._count} copies, {tools} tool{'s' if tools > 1 else ''})"
+        return f"Sensor({self._scene.name}, {self._count} copies, {count_text(self.tools, 'tool')})"
 
     @property
     def count(self) -> int:

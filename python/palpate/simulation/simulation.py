@@ -33,6 +33,7 @@ from palpate.simulation.recording import LOG_DTYPE, Recording, RecordingStatus, 
 from palpate.simulation.scheduling import scheduled, start_loop
 from palpate.simulation.script import for_all_tools, grabs_of, orientations_of, positions_of, strike_of
 from palpate.simulation.warned import error_text, limit_text, refused_text
+from palpate.units import count_text
 from palpate.vectors import three_numbers
 
 # A tool is held at the limit of strain only where the pose has so much of it: one that has just landed is held until
@@ -107,8 +108,7 @@ class Simulation(SceneEditing):
         self._to_record: Path | None = None
 
     def __repr__(self) -> str:
-        count = len(self.scene.tools)
-        tools = f"{count} tool{'s' if count > 1 else ''}"
+        tools = count_text(len(self.scene.tools), "tool")
         moves = ", a body in motion" if any(body.motion for body in self.bodies) else ""
         return f"Simulation({self.scene.name}, {tools}{moves}, {'running' if self._running else 'stopped'})"
 

@@ -12,13 +12,7 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import ViewerError
-from palpate.fields import (
-    ElementStrain,
-    SurfaceStrain,
-    SurfaceStress,
-    extreme_values,
-    largest_magnitude,
-)
+from palpate.fields import ElementStrain, SurfaceStrain, SurfaceStress, extreme_values, largest_magnitude
 from palpate.input_file import require_file
 from palpate.scene import BuiltBody, BuiltScene
 from palpate.simulation import Simulation

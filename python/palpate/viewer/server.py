@@ -28,10 +28,9 @@ from palpate.viewer.fields import SurfaceMap
 from palpate.viewer.pages import load_pages, respond
 from palpate.viewer.session import Session, choices
 from palpate.viewer.session_host import SessionHost
-from palpate.viewer.setting_up import SettingUp
+from palpate.viewer.setting_up import MAX_PART, SettingUp
 from palpate.viewer.setup_session import SetupSession
 from palpate.viewer.status import LOG, error_message
-from palpate.viewer.upload import MAX_PART
 
 VERSION = version("palpate")
 DEFAULT_PORT = 8642

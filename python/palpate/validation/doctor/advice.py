@@ -40,10 +40,7 @@ class Advice:
 
 
 def advice(
-    machine: Machine,
-    priority: bool | None,
-    locked_memory: bool | None,
-    taken: tuple[float, float] | None = None,
+    machine: Machine, priority: bool | None, locked_memory: bool | None, taken: tuple[float, float] | None = None
 ) -> list[Advice]:
     """Everything that would help, most important first.
 
