@@ -17,9 +17,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from palpate.atomic import written_beside
+from palpate.atomic import is_leftover, written_beside
 from palpate.errors import StoreError
-from palpate.leftovers import is_leftover
 from palpate.units import memory
 
 try:

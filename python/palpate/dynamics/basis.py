@@ -13,12 +13,11 @@ import numpy as np
 import scipy
 
 from palpate import _native
-from palpate.atomic import destination
+from palpate.atomic import destination, remove_leftovers
 from palpate.body import Body, description
 from palpate.cache import cache_directory, hold, make_room
 from palpate.dynamics.matrices import Matrices, start_vector
 from palpate.errors import BodyError, StoreError
-from palpate.leftovers import remove_leftovers
 from palpate.progress import progress_reporter, status_line
 
 # Up to so many free dofs the dense solver is quicker than Lanczos for most counts.

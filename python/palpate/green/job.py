@@ -11,14 +11,13 @@ from pathlib import Path
 import numpy as np
 
 from palpate import _native
-from palpate.atomic import destination
+from palpate.atomic import destination, remove_leftovers
 from palpate.body import Body, SurfaceRegion, description, problem_arrays, surface_region
 from palpate.cache import cache_directory, make_room
 from palpate.errors import BodyError, StoreError
 from palpate.green.function import GreensFunction
 from palpate.green.resources import DiskUse, allowed_memory, available_memory, require_room
 from palpate.input_file import require_writable
-from palpate.leftovers import remove_leftovers
 from palpate.units import brief_repr
 
 # Number formats of stores.

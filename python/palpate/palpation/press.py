@@ -16,10 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.palpation.partial import Run
 from palpate.palpation.protocol import Protocol, Sites
 from palpate.palpation.records import PressCurve
-from palpate.palpation.runs import Path3D
+from palpate.palpation.runs import Path3D, Run
 from palpate.simulation import Simulation
 from palpate.vectors import turning_z_to
 

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.errors import SceneError
-from palpate.palpation.partial import Run
 from palpate.palpation.press import (
     FORCE_LIMIT,
     NO_CONTACT,
@@ -25,7 +24,7 @@ from palpate.palpation.press import (
 )
 from palpate.palpation.protocol import Protocol, Selection, Sites, closest
 from palpate.palpation.records import PressCurve
-from palpate.palpation.runs import Path3D
+from palpate.palpation.runs import Path3D, Run
 from palpate.palpation.sides import Side, distances_to_lines
 from palpate.simulation import Simulation
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from palpate.errors import Error
-from palpate.validation.verify import bending, curved, exactness, felt, half_space, palpation, surface, vibration
+from palpate.validation.verify import exactness, felt, half_space, palpation, statics, surface, vibration
 from palpate.validation.verify.check import Benchmark
-from palpate.validation.verify.contact import beside, energy, groove, large_strain, pressing, sliding
+from palpate.validation.verify.contact import energy, groove, large_strain, pressing, sliding
 
 BENCHMARKS = {
     benchmark.name: benchmark
@@ -16,10 +16,10 @@ BENCHMARKS = {
         Benchmark("rigid", "Rigid motions", exactness.rigid_motions),
         Benchmark("convergence", "Orders of convergence, smooth displacement", exactness.convergence, slow=True),
         Benchmark("surface", "All of a surface in stages, 5k tetrahedra", surface.full_surface),
-        Benchmark("cantilever", "Cantilever, length 10 depths", bending.cantilever),
-        Benchmark("cook", "Cook's membrane, plane strain", bending.cook),
-        Benchmark("le10", "NAFEMS LE10, thick elliptic plate", curved.thick_plate),
-        Benchmark("sphere", "Thick sphere under internal pressure, 10 nodes", curved.thick_sphere),
+        Benchmark("cantilever", "Cantilever, length 10 depths", statics.cantilever),
+        Benchmark("cook", "Cook's membrane, plane strain", statics.cook),
+        Benchmark("le10", "NAFEMS LE10, thick elliptic plate", statics.thick_plate),
+        Benchmark("sphere", "Thick sphere under internal pressure, 10 nodes", statics.thick_sphere),
         Benchmark("point", "Point force on a half-space, 10 nodes", half_space.point_force),
         Benchmark("disc", "Uniform pressure on a half-space, 10 nodes", half_space.pressed_disc),
         Benchmark("punch", "Rigid flat punch without friction, 10 nodes", half_space.flat_punch),
@@ -32,7 +32,7 @@ BENCHMARKS = {
         Benchmark("hertz", "A sphere in the tick, R = 10 mm, on a block of 10 kPa", pressing.hertz, slow=True),
         Benchmark("strain", "A sphere pressed deep, neo-Hookean, E = 10 kPa", large_strain.large_strain, slow=True),
         Benchmark("shapes", "An ellipsoid and a rounded punch in the tick", pressing.shapes, slow=True),
-        Benchmark("beside", "A sphere beside an edge, and beside another", beside.edges_and_neighbours, slow=True),
+        Benchmark("beside", "A sphere beside an edge, and beside another", pressing.edges_and_neighbours, slow=True),
         Benchmark("groove", "A sphere in a groove: two places at once", groove.groove, slow=True),
         Benchmark("slide", "Sliding without friction at constant depth", sliding.ripple, slow=True),
         Benchmark("sweep", "Sweeps by the micrometre", sliding.jumps, slow=True),

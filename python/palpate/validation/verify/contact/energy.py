@@ -14,8 +14,8 @@ from palpate.scene import BodyMotion
 from palpate.simulation import Simulation
 from palpate.validation.verify.check import Check, Outcome
 from palpate.validation.verify.contact import measures
-from palpate.validation.verify.contact.closed_paths import ClosedPaths
 from palpate.validation.verify.contact.loop import loop_of, sphere
+from palpate.validation.verify.contact.paths import ClosedPaths
 from palpate.validation.verify.contact.reference import Block, body_on_table, top_nodes
 from palpate.validation.verify.grids import box
 from palpate.validation.verify.solution import green_of, modes_of, quiet_body

@@ -17,8 +17,8 @@ from palpate.mesh import TetMesh
 from palpate.simulation import Simulation
 from palpate.validation.verify.check import Check, Outcome
 from palpate.validation.verify.contact import measures, tools
-from palpate.validation.verify.contact.closed_paths import ClosedPaths
 from palpate.validation.verify.contact.loop import loop_of, sphere, straight
+from palpate.validation.verify.contact.paths import ClosedPaths
 from palpate.validation.verify.contact.reference import SOFT, graded
 from palpate.validation.verify.contact.signorini import ContactProblem, compliance_along, faces_on
 from palpate.validation.verify.grids import lattice, mapped

@@ -10,13 +10,22 @@ from typing import Any
 import numpy as np
 
 from palpate.body import Body
+from palpate.simulation import Simulation
 from palpate.validation.plots import plot_pressing
 from palpate.validation.verify.check import Check, Outcome
 from palpate.validation.verify.contact import closed_forms, measures, tools
+from palpate.validation.verify.contact.loop import loop_of, sphere, straight
 from palpate.validation.verify.contact.loop import pressed as pressed_tool
-from palpate.validation.verify.contact.loop import sphere
-from palpate.validation.verify.contact.reference import Block, body_on_table, finer_in_the_middle, sphere_press
+from palpate.validation.verify.contact.reference import (
+    Block,
+    body_on_table,
+    cell_under,
+    finer_in_the_middle,
+    sphere_press,
+    top_nodes,
+)
 from palpate.validation.verify.contact.tools import Gap
+from palpate.validation.verify.solution import green_of
 
 BLOCK, DEEP = Block(), Block((0.4, 0.4, 0.2))
 RADIUS = 0.01
@@ -33,6 +42,9 @@ REACH, WIDE_REACH = 0.025, 0.03
 # Other tools on the deep block, which is no half-space: it is stiffer than one by about the contact radius over its
 # height.
 DEEP_DEPTH, TOLERANCE = 5e-4, 0.04
+# Beside an edge of the body and beside another tool the half-space of the local law is not valid: depth, distances of
+# the tool's middle from the edge and the largest errors there, none where it is only shown, and of two tools, m.
+BESIDE_DEPTH, EDGES, APART = 1e-3, {0.02: 0.03, 0.01: 0.03, 0.005: None}, 0.02
 
 
 def meshes() -> dict[tuple[str, float], Body]:
@@ -149,3 +161,32 @@ def shapes() -> Outcome:
         title = f"{shape.name}, deep block, {1e3 * DEEP_DEPTH:g} mm"
         checks.append(Check(title, 1e3 * force, 1e3 * exact, shape.source, TOLERANCE, "mN"))
     return Outcome(checks)
+
+
+def edges_and_neighbours() -> Outcome:
+    """Press a sphere near an edge, and two side by side."""
+    body = body_on_table(BLOCK, (10, 10, 5), quadratic=True)
+    green = green_of(body, touch=top_nodes(body))
+    one = loop_of(body, green, [sphere(RADIUS)])
+    middle, top = BLOCK.size[1] / 2, BLOCK.size[2] + RADIUS
+    reach, cell = cell_under(RADIUS, BESIDE_DEPTH)
+    checks = []
+    for distance, tolerance in EDGES.items():
+        force = pressed_down(one, np.array([[distance, middle, top]]))[0]
+        solved = BLOCK.pressed(tools.sphere(RADIUS), [BESIDE_DEPTH], reach, cell, place=(distance, middle))[0].force
+        title = f"force, {1e3 * distance:g} mm from an edge"
+        checks.append(Check(title, 1e3 * force, 1e3 * solved, DIRECT, tolerance, "mN"))
+    two = loop_of(body, green, [sphere(RADIUS)] * 2)
+    forces = pressed_down(two, np.array([[middle + side * APART / 2, middle, top] for side in (-1, 1)]))
+    # The plane between two equal tools is one of symmetry.
+    gap = tools.sphere(RADIUS, (APART / 2, 0.0))
+    solved = BLOCK.pressed(gap, [BESIDE_DEPTH], reach, cell, beside=(APART / 2, 0.0))[0].force / 2
+    title = f"force on each of two tools, {1e3 * APART:g} mm apart"
+    checks.append(Check(title, 1e3 * forces.mean(), 1e3 * solved, DIRECT, 0.03, "mN"))
+    return Outcome(checks)
+
+
+def pressed_down(simulation: Simulation, touching: np.ndarray) -> np.ndarray:
+    """Return normal forces (tools,), N, of tools that go down by the depth from where they touch, (tools, 3) m."""
+    paths = [straight(place + (0, 0, BESIDE_DEPTH), place - (0, 0, BESIDE_DEPTH), 5e-5) for place in touching]
+    return simulation.run(np.stack(paths, axis=1))[-1, :, 2]

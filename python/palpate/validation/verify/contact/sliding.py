@@ -13,9 +13,14 @@ from palpate.simulation import Simulation
 from palpate.validation.plots import plot_partial_slip
 from palpate.validation.verify.check import Check, Outcome
 from palpate.validation.verify.contact import closed_forms, measures
-from palpate.validation.verify.contact.closed_paths import ClosedPaths
-from palpate.validation.verify.contact.curves import Curve, away_from_supports, section, touches_nothing_else
 from palpate.validation.verify.contact.loop import loop_of, sphere, straight, swept, touch_heights
+from palpate.validation.verify.contact.paths import (
+    ClosedPaths,
+    Curve,
+    away_from_supports,
+    section,
+    touches_nothing_else,
+)
 from palpate.validation.verify.contact.reference import (
     SOFT,
     Block,
