@@ -28,7 +28,7 @@ def require_places(record: Path | None, out: Path | None, page: tuple[str, int] 
     if out is not None:
         require_folder(out)
     if page is not None:
-        from palpate.viewer.addresses import require_free_port
+        from palpate.viewer.pages import require_free_port
 
         require_free_port(*page)
 

@@ -18,7 +18,7 @@ from palpate.scene.devices import KINDS, LOOP_KEYS, DeviceTable
 from palpate.scene.dynamics import DynamicsTable
 from palpate.scene.loads import LoadTable
 from palpate.scene.node_file import is_node_file
-from palpate.scene.regions import MaterialTable, RegionTable, SegmentTable
+from palpate.scene.regions import MaterialTable, RegionTable, SegmentTable, TouchTable
 from palpate.scene.table import (
     Length,
     Orientation,
@@ -33,7 +33,6 @@ from palpate.scene.table import (
     one_of,
 )
 from palpate.scene.tool_shape import ShapeTable
-from palpate.scene.touch import TouchTable
 from palpate.segmentation.endings import SEGMENTATION_ENDINGS, is_segmentation
 from palpate.units import length_scale
 

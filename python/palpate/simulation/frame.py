@@ -1,8 +1,8 @@
-"""Frames: the latest tick of a running loop, with its bodies and contacts."""
+"""Frames: the latest tick of a running loop, with its bodies and contacts, and the texts of warnings about them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -245,3 +245,29 @@ def thin_places(contacts: Sequence[Contact], tools: Sequence[ToolTable], bodies:
 def _size(tool: ToolTable) -> float:
     """Radius of a tool, m; of an ellipsoid the smallest semi-axis."""
     return min(tool.semi_axes) if tool.semi_axes is not None else tool.radius or 0.0
+
+
+def error_text(error: float) -> str:
+    """Warning of the largest estimated relative error of a force."""
+    return (
+        f"the force of a contact may be off by {100 * error:.2g} % (`error` of the contacts): press less deep, or "
+        "make the elements smaller"
+    )
+
+
+def limit_text(what: str, bodies: Iterable[BuiltBody], strain_limit: float) -> str:
+    """Warning of a tool, which ``what`` names, that was held."""
+    if any(body.is_hyperelastic for body in bodies):
+        return (
+            f"{what} was held where the law of its material ends, so the force stays as it was at that depth: "
+            "press less deep"
+        )
+    return (
+        f"{what} was held at the strain limit of {100 * strain_limit:.0f} % (view.strain_limit): its "
+        f"force stays as it was at that depth; press less deep"
+    )
+
+
+def refused_text(tick: int, reason: str) -> str:
+    """Warning of a tool that was in a body without a force."""
+    return f"a tool reached a body without a force, first in tick {tick}: {reason}"

@@ -28,11 +28,19 @@ from palpate.simulation.about import about
 from palpate.simulation.arguments import body_arguments, core_of, needs_moduli
 from palpate.simulation.changing import SceneEditing
 from palpate.simulation.connecting import assume_tables, connect, disconnect, require_devices
-from palpate.simulation.frame import Contact, Frame, contact_of, frame_of, thin_places
+from palpate.simulation.frame import (
+    Contact,
+    Frame,
+    contact_of,
+    error_text,
+    frame_of,
+    limit_text,
+    refused_text,
+    thin_places,
+)
 from palpate.simulation.recording import LOG_DTYPE, Recording, RecordingStatus, require_new_recording
 from palpate.simulation.scheduling import scheduled, start_loop
 from palpate.simulation.script import for_all_tools, grabs_of, orientations_of, positions_of, strike_of
-from palpate.simulation.warned import error_text, limit_text, refused_text
 from palpate.units import count_text
 from palpate.vectors import three_numbers
 

@@ -22,12 +22,10 @@ from palpate.errors import Error, ViewerError
 from palpate.green import BackgroundPrecompute
 from palpate.scene import BuiltScene, Scene
 from palpate.viewer import messages
-from palpate.viewer.addresses import port_in_use, reachable
-from palpate.viewer.client import Client
 from palpate.viewer.fields import SurfaceMap
-from palpate.viewer.pages import load_pages, respond
+from palpate.viewer.pages import load_pages, port_in_use, reachable, respond
 from palpate.viewer.session import Session, choices
-from palpate.viewer.session_host import SessionHost
+from palpate.viewer.session_host import Client, SessionHost
 from palpate.viewer.setting_up import MAX_PART, SettingUp
 from palpate.viewer.setup_session import SetupSession
 from palpate.viewer.status import LOG, error_message

@@ -19,10 +19,9 @@ from palpate.scene import BuiltScene
 from palpate.scene.tables import ToolTable
 from palpate.simulation import Contact, Frame, Simulation
 from palpate.viewer.fields import ClientView, Fields, SurfaceMap
-from palpate.viewer.log_rows import RecentRows, downsampled
 from palpate.viewer.messages import encode, flag, index, number, numbered, quaternion, vector, word
 from palpate.viewer.motion import HISTORY_COLUMNS, MovingBody, history
-from palpate.viewer.recorder import SessionRecorder
+from palpate.viewer.recorder import RecentRows, SessionRecorder, downsampled
 from palpate.viewer.shown_body import ShownBody, title_of
 from palpate.viewer.tool_shapes import kind_of, outline, shape_choices, with_shape
 
