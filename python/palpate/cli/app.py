@@ -163,7 +163,7 @@ def touch(
     from palpate.fields import STRAIN_LIMIT
     from palpate.green import GreensFunction, error_text
     from palpate.mesh import size_text
-    from palpate.scene.default_radius import default_contact_radius
+    from palpate.scene.sizes import default_contact_radius
     from palpate.units import length
 
     require_store(store)

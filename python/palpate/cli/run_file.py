@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from palpate.mesh.segmented import Draw
     from palpate.progress import Reporter
     from palpate.scene import BuiltScene, Scene
-    from palpate.scene.early import Expected
+    from palpate.scene.sizes import Expected
 
 
 @dataclass(frozen=True)
@@ -227,10 +227,9 @@ def _bare(
     from palpate.mesh import size_text
     from palpate.scene import BuiltScene, Scene
     from palpate.scene.build import marked_as_growing
-    from palpate.scene.default_radius import require_tool_sizes
-    from palpate.scene.early import pressing_radii
     from palpate.scene.regions import DEFAULT_LAW
     from palpate.scene.series import with_stored_series
+    from palpate.scene.sizes import pressing_radii, require_tool_sizes
 
     require_unit(options.unit)
     defaults = []
@@ -287,7 +286,7 @@ def _green(
     from palpate.green import BackgroundPrecompute, precompute
     from palpate.mesh import shapes
     from palpate.progress import Reporter, progress_reporter
-    from palpate.scene.early import Expected
+    from palpate.scene.sizes import Expected
 
     if isinstance(progress, Reporter):
         progress.phase("planning")

@@ -2,6 +2,5 @@
 
 from palpate.scene.build import BuiltBody, BuiltScene, mesh_of_body, unsolved_body
 from palpate.scene.dynamics import BodyMotion, StrikeTable
-from palpate.scene.model_scenes import MODES, TOOLS, YOUNGS_MODULUS, model_scene
-from palpate.scene.scene import Scene
+from palpate.scene.scene import MODES, TOOLS, YOUNGS_MODULUS, Scene, model_scene
 from palpate.scene.tables import MOST_FRICTION, DeviceTable, ToolTable

@@ -1,4 +1,4 @@
-"""Building of a scene: meshes, bodies, Green's functions and modes."""
+"""Building of a scene: meshes, bodies, Green's functions and modes; and where a script presses it."""
 
 from __future__ import annotations
 
@@ -21,13 +21,12 @@ from palpate.mesh.label_summary import label_summary
 from palpate.mesh.size import scale_of
 from palpate.mesh.tetrahedralize import closed_surface, read_surface, tetrahedralize_with
 from palpate.progress import progress_reporter
-from palpate.scene.default_radius import require_tool_sizes, with_radii
 from palpate.scene.dynamics import BodyMotion
-from palpate.scene.early import Expected, pressing_radii
+from palpate.scene.files import is_node_file, read_nodes
 from palpate.scene.loads import together
 from palpate.scene.mistakes import located
-from palpate.scene.node_file import is_node_file, read_nodes
 from palpate.scene.regions import MaterialTable
+from palpate.scene.sizes import Expected, pressing_radii, require_tool_sizes, with_radii
 from palpate.scene.tables import BodyTable, SceneTables, SupportsTable
 from palpate.segmentation.endings import is_segmentation
 from palpate.vectors import conjugate, rotated
@@ -36,6 +35,8 @@ if TYPE_CHECKING:
     from distributed import Client
 
 Progress = bool | Callable[[int, int], None]
+# How deep a script presses, as a part of the body's longest side: small strains.
+DEPTH = 0.03
 
 
 @dataclass(frozen=True)
@@ -372,3 +373,20 @@ def _unused(name: str, names: Mapping[str, int]) -> str:
     """Return a name that is not among those given, with a number behind it where it must."""
     candidates = (name if count == 1 else f"{name} {count}" for count in itertools.count(1))
     return next(candidate for candidate in candidates if candidate not in names)
+
+
+def press_place(built: BuiltScene) -> tuple[np.ndarray, float]:
+    """Where the first tool's origin rests when it just touches from above, m, and how deep it presses, m.
+
+    Raises SceneError for a body whose whole surface is fixed.
+    """
+    body = built.bodies[0]
+    green, nodes = body.green, body.points_to_scene(body.green.surface_positions)
+    free = np.flatnonzero(~np.isin(green.surface_nodes, green.fixed_nodes))
+    if len(free) == 0:
+        raise SceneError("the whole surface is fixed: nothing can be pressed")
+    size = float(np.ptp(nodes, axis=0).max())
+    highest = free[nodes[free, 2] > nodes[free, 2].max() - 0.01 * size]
+    middle = nodes[:, :2].mean(axis=0)
+    top = nodes[highest[np.argmin(np.linalg.norm(nodes[highest, :2] - middle, axis=1))]]
+    return top + [0, 0, built.scene.tools[0].reach], DEPTH * size

@@ -16,8 +16,8 @@ from palpate.mesh.fill_job import Element, FillOptions, Mesher
 from palpate.mesh.surface_file import SURFACE_ENDINGS
 from palpate.scene.devices import KINDS, LOOP_KEYS, DeviceTable
 from palpate.scene.dynamics import DynamicsTable
+from palpate.scene.files import is_node_file
 from palpate.scene.loads import LoadTable
-from palpate.scene.node_file import is_node_file
 from palpate.scene.regions import MaterialTable, RegionTable, SegmentTable, TouchTable
 from palpate.scene.table import (
     Length,

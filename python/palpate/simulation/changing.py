@@ -19,8 +19,14 @@ from palpate.scene.devices import KINDS
 from palpate.scene.mistakes import reason_of
 from palpate.scene.series import with_series_of_tools, with_stored_series
 from palpate.scene.tables import BodyTable, SceneTables, device_change, tables_of_tools, without_devices
-from palpate.simulation.arguments import body_arguments, needs_moduli, tool_arguments
-from palpate.simulation.connecting import connect_tool, require_devices, warn_if_limited
+from palpate.simulation.native import (
+    body_arguments,
+    connect_tool,
+    needs_moduli,
+    require_devices,
+    tool_arguments,
+    warn_if_limited,
+)
 from palpate.simulation.series_growth import SeriesGrowth
 from palpate.vectors import three_numbers
 

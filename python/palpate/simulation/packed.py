@@ -25,8 +25,7 @@ from palpate.input_file import require_replaceable
 from palpate.scene import BuiltBody, BuiltScene, Scene
 from palpate.scene.series import with_whole_series
 from palpate.scene.tables import SceneTables
-from palpate.simulation.arguments import body_arguments, core_of, needs_moduli, tool_arguments
-from palpate.simulation.connecting import largest_force
+from palpate.simulation.native import body_arguments, core_of, largest_force, needs_moduli, tool_arguments
 
 # Format of the folder; crates/scene reads it.
 FORMAT, VERSION = "palpate-scene", 2

@@ -17,8 +17,8 @@ from palpate.progress import progress_reporter
 from palpate.scene import BuiltScene, Scene
 from palpate.scene.series import with_whole_series
 from palpate.simulation.about import measured_by_surface, require_same, scene_of, with_recorded_series
-from palpate.simulation.connecting import assume_recorded
 from palpate.simulation.frame import PERCENTILES, Frame, frame_of
+from palpate.simulation.native import assume_recorded
 from palpate.simulation.recording import LOG_DTYPE, Recording
 from palpate.simulation.simulation import Simulation
 

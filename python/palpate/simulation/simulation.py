@@ -25,9 +25,7 @@ from palpate.fields import StrainMeasure, SurfaceStress
 from palpate.green import GreensFunction
 from palpate.scene import BodyMotion, BuiltBody, BuiltScene, Scene
 from palpate.simulation.about import about
-from palpate.simulation.arguments import body_arguments, core_of, needs_moduli
 from palpate.simulation.changing import SceneEditing
-from palpate.simulation.connecting import assume_tables, connect, disconnect, require_devices
 from palpate.simulation.frame import (
     Contact,
     Frame,
@@ -37,6 +35,15 @@ from palpate.simulation.frame import (
     limit_text,
     refused_text,
     thin_places,
+)
+from palpate.simulation.native import (
+    assume_tables,
+    body_arguments,
+    connect,
+    core_of,
+    disconnect,
+    needs_moduli,
+    require_devices,
 )
 from palpate.simulation.recording import LOG_DTYPE, Recording, RecordingStatus, require_new_recording
 from palpate.simulation.scheduling import scheduled, start_loop

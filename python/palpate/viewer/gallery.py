@@ -19,7 +19,7 @@ import numpy as np
 from palpate.errors import TouchWarning
 from palpate.mesh.triangles import area_vectors, node_area_vectors, units
 from palpate.scene import BuiltScene
-from palpate.scene.press_place import press_place
+from palpate.scene.build import press_place
 from palpate.scene.series import with_whole_series
 from palpate.sessions.shapes import ARROW_PART, arrow, tool_surface
 from palpate.simulation import Frame, Simulation

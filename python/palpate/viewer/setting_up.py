@@ -24,8 +24,8 @@ from palpate.mesh.fill_process import FillProcess, ReadFile
 from palpate.mesh.surface_file import SURFACE_ENDINGS
 from palpate.scene import Scene
 from palpate.scene.build import unsolved_body
-from palpate.scene.early import Expected
 from palpate.scene.regions import TouchTable
+from palpate.scene.sizes import Expected
 from palpate.segmentation.endings import SEGMENTATION_ENDINGS
 from palpate.viewer.computing import mask_of
 from palpate.viewer.messages import whole

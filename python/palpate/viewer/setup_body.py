@@ -20,9 +20,8 @@ from palpate.mesh.fill_process import ReadFile
 from palpate.mesh.shapes import Sphere
 from palpate.mesh.size import COMMON_UNITS
 from palpate.scene import Scene
-from palpate.scene.default_radius import PART_OF_BODY
-from palpate.scene.node_file import write_nodes
-from palpate.scene.writing import scene_text
+from palpate.scene.files import scene_text, write_nodes
+from palpate.scene.sizes import PART_OF_BODY
 from palpate.units import length_scale
 from palpate.viewer.computing import mask_text
 from palpate.viewer.messages import flag, number, vector, whole, word
