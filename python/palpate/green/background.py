@@ -78,7 +78,7 @@ class BackgroundPrecompute:
             self._touchable = self._unfetched.touchable_nodes
         memory = job.allowed(None)
         job.make_room()
-        self._child = child = start_child("palpate.green.child")
+        self._child = child = start_child("columns")
         assert child.stdin is not None and child.stdout is not None
         self._input = child.stdin
         names = ("arguments", "precision_name", "within", "description", "path", "memory", "first", "key")

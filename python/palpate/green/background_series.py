@@ -121,7 +121,7 @@ class BackgroundSeries:
         seen = self._look(number, file, None)
         if self._counts[number][0] == self._counts[number][1] > 0:
             return
-        child = start_child("palpate.green.series_child")
+        child = start_child("series")
         assert child.stdin is not None and child.stdout is not None
         listener = threading.Thread(target=self._listen, args=(number, child.stdout), daemon=True)
         listener.start()

@@ -24,18 +24,9 @@ _CPUS = one_of(
 class DeviceTable(Table):
     """A device, where its workspace lies in the scene, and its limits; of the first table also how the loop runs.
 
-    ``kind`` is what it is: ``simulated`` follows a pointer or a program. ``id`` chooses among several of a kind,
-    ``address`` is that of its service and ``library`` the vendor's library, where the driver's own choice will not do.
-
-    ``position`` (m) is where the device's origin lies in the scene, ``orientation`` (unit quaternion w x y z) how its
-    axes stand there. They are x to the right, y away, z up for the person in front of it. ``scale`` is metres of the
-    scene per metre of the device, ``force_scale`` the force on the hand per force in the scene. While button ``clutch``
-    is held the tool is out of the scene, and the hand can reach for more.
-
-    ``max_force`` and ``max_stiffness`` are kept at the device, by the safety stage and by the contact; a device that
-    renders less has lower ones of its own. ``cpus`` are the processors that the loop's thread keeps to, by their
-    numbers; none for any. ``priority`` is that under ``SCHED_FIFO``, 1 to 99, where the system grants it, or 0 for
-    ordinary scheduling. A priority that is given and not granted raises a warning; the default appears in the
+    The axes of its own frame are x to the right, y away, z up for the person in front of it. ``max_force`` and
+    ``max_stiffness`` are kept at the device, by the safety stage and by the contact; a device that renders less has
+    lower ones of its own. A ``priority`` that is given and not granted raises a warning; the default appears in the
     statistics only.
     """
 

@@ -11,11 +11,7 @@ from palpate.scene.table import Acceleration, ForceVector, SignedPressure, Table
 
 
 class LoadTable(Table):
-    """One load: gravity (m/s^2), a pressure on a part of the surface, or a force.
-
-    ``on`` is a predicate over x, y, z that names the part of the surface; a force is spread evenly over it, or acts in
-    full on each of ``nodes``.
-    """
+    """One load: gravity, a pressure on a part of the surface, or a force, which acts in full on each of ``nodes``."""
 
     gravity: Acceleration | None = None
     """Acceleration of the whole body, m/s^2."""

@@ -229,11 +229,7 @@ _Area = Annotated[
 
 
 class TouchTable(Table):
-    """Where the body may be touched; what is left out is the whole surface.
-
-    ``first`` is computed before the rest. `palpate run` opens when it is ready, and goes on with the rest beside the
-    force loop.
-    """
+    """Where the body may be touched, and what of it is computed first: the rest follows beside the force loop."""
 
     region: _Area | None = None
     """Part of the surface that may be touched: a predicate, the name of a region of the mesh file, node numbers, or

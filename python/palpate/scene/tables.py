@@ -80,15 +80,10 @@ class SupportsTable(Table):
 class BodyTable(Table):
     """A solid, one of: a mesh file (volume, surface or segmentation to be filled), a built-in model, a store.
 
-    Paths are relative to the scene file. ``paper`` takes the model in the size of the paper. A surface is
-    filled with 10-node tetrahedra unless ``element = "linear"``. Volume meshes and models are taken as they are, unless
-    ``element = "quadratic"`` gives 4-node tetrahedra the middles of their edges as nodes. Supports listed by node then
-    fix the middles between them. ``mesher``, ``part`` and ``max_volume_loss`` are those of
-    :func:`palpate.tetrahedralize`. ``segment`` names parts of a label map, which become regions with their names.
-
-    ``position`` (m) and ``orientation`` (unit quaternion w x y z) place the body's own frame in the scene; predicates
-    and shapes speak of the body's own frame. ``material``, ``supports``, ``touch``, ``region``, ``loads`` and
-    ``dynamics`` of the body come before those of the whole scene.
+    Paths are relative to the scene file. ``element = "quadratic"`` gives 4-node tetrahedra of volume meshes and models
+    the middles of their edges as nodes. Supports listed by node then fix the middles between them. ``mesher``, ``part``
+    and ``max_volume_loss`` are those of :func:`palpate.tetrahedralize`. ``segment`` names parts of a label map, which
+    become regions with their names. Predicates and shapes speak of the body's own frame.
     """
 
     name: str | None = None
@@ -184,13 +179,9 @@ class BodyTable(Table):
 class ToolTable(ShapeTable):
     """A tool: what it looks like, how it touches, and what it rubs with.
 
-    ``contact = "local"`` is contact with a half-space in series with the finite elements: it slides with Coulomb's
-    ``friction``, and ``pad_youngs_modulus`` makes a finger's pad of a rigid tool. ``"patch"`` sticks with a disc of
-    ``contact_radius`` to what it first touched. ``"node"`` takes the closest node, as the paper does, whose stiffness
-    goes to zero with the size of the elements. A tool that grabs holds on by the disc, whatever its law. A tool that
-    names a ``contact_radius`` and no law is a patch, because only patches have one. A radius that is not given follows
-    the body.
-    ``device`` is the name of a ``[[device]]`` table, or a kind of device.
+    ``contact = "local"`` is contact with a half-space in series with the finite elements. ``"patch"`` sticks to what it
+    first touched. Under ``"node"`` the stiffness goes to zero with the size of the elements. A tool that grabs holds on
+    by the disc of ``contact_radius``, whatever its law.
     """
 
     contact: Literal["local", "patch", "node"] = "local"
@@ -280,7 +271,6 @@ class ViewTable(Table):
     """Where the camera stands and what it looks at, m (by default the whole body), and the strain that limits the tool.
 
     Linear elasticity is accurate up to about 10 % strain, where the page warns; finger presses go beyond.
-    ``strain_limit = 0`` takes the limit away.
     """
 
     position: tuple[float, float, float] | None = None
