@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from palpate import _native
-from palpate.devices.reading import DeviceLimits
+from palpate.devices.device import DeviceLimits
 from palpate.errors import DeviceError
 
 RULES = "/etc/udev/rules.d/70-palpate-haptics.rules"

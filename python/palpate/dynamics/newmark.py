@@ -10,9 +10,8 @@ import scipy
 
 from palpate import _native, units
 from palpate.body import Body
-from palpate.dynamics.basis import ZERO_EIGENVALUE, ModalBasis, basis_key
+from palpate.dynamics.basis import ZERO_EIGENVALUE, Matrices, ModalBasis, basis_key, native, start_vector
 from palpate.dynamics.basis import modes as compute_modes
-from palpate.dynamics.matrices import Matrices, native, start_vector
 from palpate.equality import ComparedByValue
 from palpate.errors import BodyError
 from palpate.units import brief_repr
@@ -344,7 +343,7 @@ class Residual:
     `R = Psi - Phi diag(1/omega^2) Phi^T` over the elastic modes kept, `Psi` being the static compliance. Its modes are
     so fast against the load that they follow it statically; with it, a constant load ends at the static solution for
     any number of modes. For a body that can move freely, `Psi` is the compliance to self-balanced loads, seen without
-    rigid motion: the load is balanced by the inertia of the rigid motions first, and their share is removed from the
+    rigid motion. The load is balanced by the inertia of the rigid motions first, and their share is removed from the
     answer.
 
     Raises

@@ -18,9 +18,8 @@ from palpate.body import Body, SurfaceRegion, surface_region
 from palpate.errors import BodyError, StoreError, StoreWarning
 from palpate.green.bounds import CHOSEN
 from palpate.green.child_process import end_child, send_job, send_line, start_child
-from palpate.green.claim import waiting_message
 from palpate.green.function import GreensFunction
-from palpate.green.job import Job
+from palpate.green.job import Job, waiting_message
 
 # The child gives way to everything else once a force loop runs.
 NICEST = 19

@@ -15,7 +15,7 @@ from pathlib import Path
 from palpate import _native
 from palpate.errors import Error
 from palpate.green.child_process import compute_and_exit, progress_sender, received_job, received_lines, send
-from palpate.green.claim import claimed
+from palpate.green.job import claimed
 
 
 class _NextNodes:

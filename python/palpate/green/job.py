@@ -1,10 +1,15 @@
-"""A precomputation to be run: its problem, its target file, and the checks of memory and disk space."""
+"""A precomputation to be run: its problem, its target file, the checks of memory and disk space.
+
+One process at a time writes a store, others wait.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import json
 import os
+import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,6 +27,8 @@ from palpate.units import brief_repr
 
 # Number formats of stores.
 PRECISIONS = ("f16", "f32", "f64")
+# Between two attempts to claim a store, s.
+PAUSE = 0.1
 
 
 @dataclass(frozen=True)
@@ -120,3 +127,23 @@ def _require_store(path: Path) -> None:
     # Length of the header, and the header in JSON, as of safetensors.
     if not start[8:].startswith(b'{"__metadata__"'):
         raise StoreError(f"{path}: exists, and is no store: give another name, or delete it first")
+
+
+@contextlib.contextmanager
+def claimed(target: Path, waiting: Callable[[], None]) -> Iterator[_native.StoreClaim]:
+    """Claim the store at ``target`` until the block ends, as soon as no other process computes it.
+
+    ``waiting`` is called before every pause. Raises OSError if no file can be written there.
+    """
+    while (claim := _native.StoreClaim.take(target)) is None:
+        waiting()
+        time.sleep(PAUSE)
+    try:
+        yield claim
+    finally:
+        claim.release()
+
+
+def waiting_message(target: Path) -> str:
+    """Message for the time of waiting."""
+    return f"another process is computing {target}: waiting for it"

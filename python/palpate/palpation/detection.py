@@ -23,9 +23,8 @@ from palpate.fields import write_result
 from palpate.figures import write_figure
 from palpate.mesh import size_text
 from palpate.palpation import pictures
-from palpate.palpation.files import XYZ, surface_mesh, write_columns, write_rows
 from palpate.palpation.protocol import Protocol, Sites, closest
-from palpate.palpation.records import Nodule
+from palpate.palpation.records import XYZ, Nodule, surface_mesh, write_columns, write_rows
 from palpate.palpation.runs import probe
 from palpate.palpation.stiffness_map import StiffnessMap, palpated
 from palpate.scene import BuiltScene, Scene

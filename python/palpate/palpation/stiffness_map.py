@@ -15,7 +15,6 @@ from palpate.errors import SceneError
 from palpate.fields import write_result
 from palpate.figures import write_figure
 from palpate.palpation import pictures
-from palpate.palpation.files import XYZ, surface_mesh, write_columns
 from palpate.palpation.press import (
     FORCE_LIMIT,
     NO_CONTACT,
@@ -26,7 +25,7 @@ from palpate.palpation.press import (
     read_presses,
 )
 from palpate.palpation.protocol import Protocol, Sites, sample_sites, sites_at_points
-from palpate.palpation.records import MapRecord
+from palpate.palpation.records import XYZ, MapRecord, surface_mesh, write_columns
 from palpate.palpation.runs import probe, run_all
 from palpate.palpation.strokes import Track, read_strokes, strokes_on
 from palpate.scene import BuiltScene, Scene

@@ -19,6 +19,7 @@ from palpate.scene.devices import KINDS
 from palpate.scene.mistakes import reason_of
 from palpate.scene.series import with_series_of_tools, with_stored_series
 from palpate.scene.tables import BodyTable, SceneTables, device_change, tables_of_tools, without_devices
+from palpate.simulation.adjustable import SeriesGrowth
 from palpate.simulation.native import (
     body_arguments,
     connect_tool,
@@ -27,7 +28,6 @@ from palpate.simulation.native import (
     tool_arguments,
     warn_if_limited,
 )
-from palpate.simulation.series_growth import SeriesGrowth
 from palpate.vectors import three_numbers
 
 Given, Answer = ParamSpec("Given"), TypeVar("Answer")

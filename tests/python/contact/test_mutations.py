@@ -16,10 +16,10 @@ import numpy as np
 import pytest
 
 from palpate.body import Body
+from palpate.validation.verify.benchmark import green_of, quiet_body
 from palpate.validation.verify.contact import energy, measures, pressing, sliding
 from palpate.validation.verify.contact.loop import loop_of, sphere
 from palpate.validation.verify.contact.reference import body_on_table, sphere_press, top_nodes
-from palpate.validation.verify.solution import green_of, quiet_body
 
 
 def stale(forces: np.ndarray, axis: int = 0) -> np.ndarray:

@@ -7,10 +7,9 @@ import numpy as np
 from palpate.body import Body, Loads, Material
 from palpate.fields import StressRecovery
 from palpate.mesh import TetMesh
-from palpate.validation.verify.check import Check, Outcome
+from palpate.validation.verify.benchmark import Check, Outcome, at_node, quiet_body, surface_response
 from palpate.validation.verify.exactness import ORDER_NAMES
 from palpate.validation.verify.grids import box, lattice, mapped, spherical
-from palpate.validation.verify.solution import at_node, quiet_body, surface_response
 
 # Cantilever of square section, ten times longer than deep, with a force across its tip.
 LENGTH, DEPTH, YOUNGS_MODULUS, FORCE = 0.1, 0.01, 1e6, 0.01

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from palpate.errors import Error
 from palpate.validation.verify import exactness, felt, half_space, palpation, statics, surface, vibration
-from palpate.validation.verify.check import Benchmark
+from palpate.validation.verify.benchmark import Benchmark
 from palpate.validation.verify.contact import energy, groove, large_strain, pressing, sliding
 
 BENCHMARKS = {

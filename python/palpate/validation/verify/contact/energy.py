@@ -12,13 +12,12 @@ from palpate.body import Body, Loads, Material
 from palpate.fields import Interior
 from palpate.scene import BodyMotion
 from palpate.simulation import Simulation
-from palpate.validation.verify.check import Check, Outcome
+from palpate.validation.verify.benchmark import Check, Outcome, green_of, modes_of, quiet_body
 from palpate.validation.verify.contact import measures
 from palpate.validation.verify.contact.loop import loop_of, sphere
 from palpate.validation.verify.contact.paths import ClosedPaths
 from palpate.validation.verify.contact.reference import Block, body_on_table, top_nodes
 from palpate.validation.verify.grids import box
-from palpate.validation.verify.solution import green_of, modes_of, quiet_body
 
 RADIUS, TOLERANCE = 0.01, 1e-3
 # Farthest that a path leads from its middle along x and y, m.

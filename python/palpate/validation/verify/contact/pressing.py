@@ -12,7 +12,7 @@ import numpy as np
 from palpate.body import Body
 from palpate.simulation import Simulation
 from palpate.validation.plots import plot_pressing
-from palpate.validation.verify.check import Check, Outcome
+from palpate.validation.verify.benchmark import Check, Outcome, green_of
 from palpate.validation.verify.contact import closed_forms, measures, tools
 from palpate.validation.verify.contact.loop import loop_of, sphere, straight
 from palpate.validation.verify.contact.loop import pressed as pressed_tool
@@ -25,7 +25,6 @@ from palpate.validation.verify.contact.reference import (
     top_nodes,
 )
 from palpate.validation.verify.contact.tools import Gap
-from palpate.validation.verify.solution import green_of
 
 BLOCK, DEEP = Block(), Block((0.4, 0.4, 0.2))
 RADIUS = 0.01

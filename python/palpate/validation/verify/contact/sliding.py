@@ -11,7 +11,7 @@ from palpate import models
 from palpate.body import Body, Material
 from palpate.simulation import Simulation
 from palpate.validation.plots import plot_partial_slip
-from palpate.validation.verify.check import Check, Outcome
+from palpate.validation.verify.benchmark import Check, Outcome, green_of, quiet_body
 from palpate.validation.verify.contact import closed_forms, measures
 from palpate.validation.verify.contact.loop import loop_of, sphere, straight, swept, touch_heights
 from palpate.validation.verify.contact.paths import (
@@ -29,7 +29,6 @@ from palpate.validation.verify.contact.reference import (
     top_middle,
     top_nodes,
 )
-from palpate.validation.verify.solution import green_of, quiet_body
 
 RADIUS, DEPTH = 0.01, 1e-3
 # Sections of the built-in bodies that are slid along: axis across the plane, through the middle of the body.
