@@ -138,7 +138,8 @@ def cache_limit() -> Limit:
     try:
         size = int(file.read_text())
     except FileNotFoundError:
-        return Limit(int(min(DEFAULT_LIMIT, DEFAULT_PART * shutil.disk_usage(_existing(file.parent)).total)), False)
+        there = next(folder for folder in file.parents if folder.exists())
+        return Limit(int(min(DEFAULT_LIMIT, DEFAULT_PART * shutil.disk_usage(there).total)), False)
     except ValueError:
         size = 0
     if size <= 0:
@@ -254,9 +255,3 @@ def _groups() -> list[_Group]:
 
 def _file() -> Path:
     return cache_directory() / "limit"
-
-
-def _existing(folder: Path) -> Path:
-    while not folder.exists():
-        folder = folder.parent
-    return folder

@@ -71,13 +71,9 @@ def listed(kind: str, address: str | None = None, library: str | os.PathLike[str
     raw = _native.list_devices(kind, address, library)
     found = tuple(
         FoundDevice(
-            device["id"],
-            device["name"],
-            DeviceLimits(*device["limits"]),
-            _obstacle(device["obstacle"]),
-            dict(device["facts"]),
+            one["id"], one["name"], DeviceLimits(*one["limits"]), _obstacle(one["obstacle"]), dict(one["facts"])
         )
-        for device in raw["found"]
+        for one in raw["found"]
     )
     return Listing(kind, found, _obstacle(raw["missing"]), dict(raw["facts"]))
 

@@ -28,7 +28,7 @@ def require_devices(devices: Mapping[int, Device]) -> None:
 
 def largest_force(scene: SceneTables) -> float:
     """Largest force in the scene that some device of it may put out, N."""
-    return max(table.max_force / table.force_scale for table in _tables(scene))
+    return max(_forces(scene))
 
 
 def largest_stiffness(table: DeviceTable) -> float:
@@ -38,8 +38,8 @@ def largest_stiffness(table: DeviceTable) -> float:
 
 def assume_tables(core: _native.SimulationCore, scene: SceneTables) -> None:
     """Keep each tool to the force of its own device, where devices differ."""
-    forces, most = [table.max_force / table.force_scale for table in _tables(scene)], largest_force(scene)
-    if any(force != most for force in forces):
+    forces = _forces(scene)
+    if any(force != max(forces) for force in forces):
         limits = [DeviceLimits(max_force=force, max_speed=None) for force in forces]
         _native.assume_devices(core, [limit.arguments for limit in limits])
 
@@ -111,8 +111,10 @@ def workspace_of(table: DeviceTable) -> tuple[Any, ...]:
     return table.position, table.orientation, table.scale, table.force_scale, table.clutch
 
 
-def _tables(scene: SceneTables) -> list[DeviceTable]:
-    return [scene.device_of(tool) for tool in range(len(scene.tools))]
+def _forces(scene: SceneTables) -> list[float]:
+    """Largest force in the scene that the device of each tool may put out, N."""
+    tables = [scene.device_of(tool) for tool in range(len(scene.tools))]
+    return [table.max_force / table.force_scale for table in tables]
 
 
 def core_of(scene: SceneTables, bodies: Sequence[tuple[Any, ...]]) -> _native.SimulationCore:

@@ -236,8 +236,7 @@ class ReplayedSimulation(Simulation):
 
     def _compare(self, found: list[tuple[int, str, str, list[float], list[float]]]) -> None:
         if found and self.difference is None:
-            tick, of, quantity, recorded, replayed = found[0]
-            self.difference = Difference(tick, of, quantity, tuple(recorded), tuple(replayed))
+            self.difference = Difference(*found[0][:3], *map(tuple, found[0][3:]))
         self.checked = max(self.checked, self.ticks_done)
         self._frame = None
 

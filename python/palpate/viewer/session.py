@@ -379,8 +379,7 @@ class Session:
         return True
 
     def _set_youngs_modulus(self, youngs_modulus: float, message: Mapping[str, Any]) -> None:
-        body = index(message, "body", len(self._bodies))
-        self.simulation.set_youngs_modulus(youngs_modulus, body)
+        self.simulation.set_youngs_modulus(youngs_modulus, index(message, "body", len(self._bodies)))
 
     def _tools(self, message: Mapping[str, Any]) -> Sequence[int]:
         """Return the tool that a message names, or all of them."""

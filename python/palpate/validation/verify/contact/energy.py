@@ -25,8 +25,6 @@ SLIDE = 0.012
 FRICTIONS = (0.0, 0.3, 1.0)
 # Closed paths in all, divided among friction, one and two tools, rest and motion, and limits of the device.
 PATHS, TICKS = 10_000, 400
-# Limits that scenes have unless they say otherwise.
-DEFAULT_DEVICE: dict = {}
 PASSIVE = "passivity"
 
 
@@ -95,7 +93,7 @@ class EnergyBench:
     def simulation(self, condition: Condition) -> Simulation:
         """Force loop for a condition."""
         tools = [{**self.tool.table, "friction": condition.friction}] * condition.tools
-        device = DEFAULT_DEVICE if condition.limited else None
+        device: dict | None = {} if condition.limited else None  # the limits of scenes that give none
         return loop_of(self.body, self.green, tools, device, self.motion if condition.moving else None)
 
     def paths(self, condition: Condition, count: int) -> ClosedPaths:
