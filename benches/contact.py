@@ -23,10 +23,10 @@ from palpate.green import GreensFunction
 from palpate.progress import status_line
 from palpate.simulation import Simulation
 from palpate.validation.ticks import tick_times
+from palpate.validation.verify.benchmark import green_of
 from palpate.validation.verify.contact import tools
 from palpate.validation.verify.contact.loop import loop_of, sphere, straight
 from palpate.validation.verify.contact.reference import Block, body_on_table, sphere_press, top_nodes
-from palpate.validation.verify.solution import green_of
 
 BLOCK, RADIUS = Block(), 0.01
 DEPTHS = (2.5e-4, 5e-4, 1e-3, 1.5e-3, 2e-3)

@@ -23,7 +23,7 @@ from benches.timing import call_times
 from palpate import models
 from palpate.body import Body, Material
 from palpate.dynamics import ModalBasis, Newmark, modes, rayleigh_from_ratios
-from palpate.dynamics.matrices import Matrices
+from palpate.dynamics.basis import Matrices
 from palpate.green import precompute
 from palpate.mesh import TetMesh, tetrahedralize
 from palpate.progress import status_line

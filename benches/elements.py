@@ -24,7 +24,7 @@ from palpate.green import precompute
 from palpate.mesh import TetMesh, tetrahedralize
 from palpate.progress import status_line
 from palpate.validation.verify import felt
-from palpate.validation.verify.solution import green_of, quiet_body
+from palpate.validation.verify.benchmark import green_of, quiet_body
 
 RATIOS = (0.3, 0.45, 0.49)
 CELLS = {False: (4, 6, 8, 12, 16, 20), True: (2, 3, 4, 6, 8, 10)}

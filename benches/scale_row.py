@@ -22,7 +22,7 @@ from palpate import _native
 from palpate.body import Body, Material, description, problem_arrays
 from palpate.green import GreensFunction
 from palpate.green.bounds import CHOSEN
-from palpate.green.memory import memory_in_use
+from palpate.green.resources import memory_in_use
 from palpate.mesh import TetMesh, filling, tetrahedralize
 from palpate.mesh.tetrahedralize import read_surface
 from palpate.simulation import Simulation

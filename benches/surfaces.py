@@ -19,14 +19,13 @@ import numpy as np
 from benches.output import Table
 from palpate import models
 from palpate.scene import BuiltScene, model_scene
-from palpate.validation.doctor.chromium import browser_page
-from palpate.viewer import drawn_surface as drawing
+from palpate.validation.doctor.measure import browser_page
 from palpate.viewer import messages
-from palpate.viewer.drawn_surface import drawn_surface
+from palpate.viewer import shown_body as drawing
 from palpate.viewer.fields import DISPLACEMENT, Picture
 from palpate.viewer.server import ViewerServer
 from palpate.viewer.session import Session
-from palpate.viewer.shown_body import ShownBody
+from palpate.viewer.shown_body import ShownBody, drawn_surface
 
 TRIANGLES = (20_000, 100_000, 500_000)
 # Width and height of the dome, m; depth of the dent, its radius, and how often a second it goes in.

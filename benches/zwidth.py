@@ -33,9 +33,9 @@ from palpate.atomic import written_beside
 from palpate.figures import empty_figure, write_figure
 from palpate.progress import progress_reporter
 from palpate.simulation import Simulation
+from palpate.validation.verify.benchmark import green_of
 from palpate.validation.verify.contact.loop import loop_of
 from palpate.validation.verify.contact.reference import Block, body_on_table, top_middle, top_nodes
-from palpate.validation.verify.solution import green_of
 
 PERIOD = 1e-3
 # Of the map: damping of the device, N s/m, its masses, kg, and delays, s.

@@ -16,7 +16,7 @@ from pydantic_core import PydanticUndefined
 from tables import code, table
 
 from palpate.exam import file as exam
-from palpate.scene import devices, dynamics, loads, regions, tables, touch
+from palpate.scene import devices, dynamics, loads, regions, tables
 from palpate.scene import table as types
 from palpate.study import cases as study
 
@@ -35,7 +35,7 @@ TABLES = (
     ("[material]", regions.MaterialTable),
     ("[[region]]", regions.RegionTable),
     ("[supports]", tables.SupportsTable),
-    ("[touch]", touch.TouchTable),
+    ("[touch]", regions.TouchTable),
     ("[[loads]]", loads.LoadTable),
     ("[[tool]]", tables.ToolTable),
     ("[[device]]", devices.DeviceTable),
@@ -67,7 +67,7 @@ QUANTITIES = (
     (types.Direction, "three numbers"),
     (types.Acceleration, "three accelerations"),
     (types.ForceVector, "three forces"),
-    (tables.Quaternion, "four numbers"),
+    (tables.Orientation, "four numbers"),
 )
 WORDS = {
     str: "text",

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 from palpate.atomic import written_beside
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 COLORS = ("tab:red", "tab:blue", "tab:green", "tab:purple")
@@ -27,11 +26,7 @@ def empty_figure(width: float, height: float) -> Figure:
 def write_figure(figure: Figure, path: Path, *, grid: bool = True, kind: str = "png") -> None:
     """Light grid where one helps, open frame; written beside and renamed."""
     for axes in figure.axes if grid else ():
-        _style_axes(axes)
+        axes.grid(alpha=0.25)
+        axes.spines[["top", "right"]].set_visible(False)
     with written_beside(path) as partial:
         figure.savefig(partial, format=kind)
-
-
-def _style_axes(axes: Axes) -> None:
-    axes.grid(alpha=0.25)
-    axes.spines[["top", "right"]].set_visible(False)

@@ -32,7 +32,7 @@ from palpate.mesh import TetMesh
 from palpate.mesh.elements import FACE_TRIANGLES
 from palpate.mesh.files import FROM_NETGEN
 from palpate.mesh.shape_functions import TRIANGLE_NODES
-from palpate.validation.verify.solution import green_of, quiet_body
+from palpate.validation.verify.benchmark import green_of, quiet_body
 
 SOFT = Material(10e3, 0.45)
 PLANE_MODULUS = 10e3 / (1 - 0.45**2)

@@ -13,8 +13,8 @@ from scipy.spatial.transform import Rotation
 
 import palpate
 from palpate.mesh import TetMesh
+from palpate.validation.verify.benchmark import quiet_body
 from palpate.validation.verify.grids import box, lattice, mapped
-from palpate.validation.verify.solution import quiet_body
 
 MATERIAL = palpate.Material(10e3, 0.45, 1000.0)
 # A torus: radii of circle and tube; a cup: radius, height, wall; a star: points, radii, length, m.

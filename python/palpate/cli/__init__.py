@@ -1,6 +1,6 @@
 """The command line."""
 
-from palpate.cli import (  # noqa: F401  they register their commands
+from palpate.cli import (  # they register their commands
     caching,
     catalogue,
     describing,

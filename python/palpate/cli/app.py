@@ -26,7 +26,7 @@ from palpate.mesh.fill_job import Element
 from palpate.mesh.tetrahedralize import tetrahedralize_with
 from palpate.progress import status_line
 from palpate.scene import BuiltScene, Scene
-from palpate.scene.default_radius import default_contact_radius
+from palpate.scene.sizes import default_contact_radius
 from palpate.startup import restore_interrupts
 from palpate.units import length
 

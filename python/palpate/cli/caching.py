@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from palpate.cache import cache_directory, cached_files, chosen_files
-from palpate.cache_limit import cache_limit, set_cache_limit
+from palpate.cache import cache_directory, cache_limit, cached_files, chosen_files, set_cache_limit
 from palpate.cli.app import app
 
 cache_app = typer.Typer(help="Precomputed files kept for you.", no_args_is_help=True)

@@ -19,7 +19,6 @@ from palpate.scene import Scene, model_scene
 from palpate.segmentation.endings import SEGMENTATION_ENDINGS, is_segmentation
 from palpate.simulation import require_new_recording
 from palpate.units import length_scale
-from palpate.viewer.addresses import require_free_port
 
 
 def require_folder(folder: Path, option: str = "--out") -> None:
@@ -38,6 +37,8 @@ def require_places(record: Path | None, out: Path | None, page: tuple[str, int] 
     if out is not None:
         require_folder(out)
     if page is not None:
+        from palpate.viewer.pages import require_free_port
+
         require_free_port(*page)
 
 

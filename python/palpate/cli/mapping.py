@@ -19,8 +19,7 @@ from palpate.cli.run_file import RunOptions, built_from, scene_with
 from palpate.errors import Error, UnitError
 from palpate.models import NAMES
 from palpate.palpation import Detection, StiffnessMap, compare, stiffness_map
-from palpate.palpation.detection import has_several_materials
-from palpate.palpation.files import DETECTION_FILES
+from palpate.palpation.detection import DETECTION_FILES, has_several_materials
 from palpate.progress import status_line
 from palpate.scene import BuiltScene, Scene, model_scene
 from palpate.units import count_text

@@ -35,12 +35,12 @@ from palpate.mesh.surface_file import load_surface
 from palpate.progress import Reporter, progress_reporter, status_line
 from palpate.scene import BuiltScene, Scene
 from palpate.scene.build import marked_as_growing
-from palpate.scene.default_radius import require_tool_sizes
-from palpate.scene.devices import KINDS, device_change, device_ranks
-from palpate.scene.early import Expected, pressing_radii
+from palpate.scene.devices import KINDS
 from palpate.scene.mistakes import reason_of
 from palpate.scene.regions import DEFAULT_LAW
 from palpate.scene.series import with_stored_series
+from palpate.scene.sizes import Expected, pressing_radii, require_tool_sizes
+from palpate.scene.tables import device_change, device_ranks
 from palpate.scene.tool_shape import KEYS
 from palpate.segmentation.endings import is_segmentation
 from palpate.simulation.scheduling import with_scheduling

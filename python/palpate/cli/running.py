@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import numpy as np
 import typer
 
-from palpate.cache import cached_files
-from palpate.cache_limit import cache_limit, kept_by_this_process
+from palpate.cache import cache_limit, cached_files, kept_by_this_process
 from palpate.cli.app import INTERRUPTED, app, prepared, print_note
 from palpate.cli.checks import finite, require_body, require_places
 from palpate.cli.completion import models
@@ -30,7 +29,7 @@ from palpate.models import NAMES
 from palpate.progress import Reporter, progress_reporter, reported_to
 from palpate.scene import BuiltScene, Scene, model_scene
 from palpate.validation.plots import plot_log, write_log
-from palpate.viewer.surface_map import read_map
+from palpate.viewer.fields import read_map
 
 if TYPE_CHECKING:
     from palpate.viewer.server import ViewerServer
@@ -223,8 +222,7 @@ def _view_early(
     file: Path, options: RunOptions, page: Page, recorded: Recorded, link: LinkOptions, surface_map: Path | None
 ) -> None:
     """Open the page at once, and prepare what is touched while it shows the surface and the stages."""
-    from palpate.viewer.live import open_viewer
-    from palpate.viewer.preparing import Preparation, Prepared, PreparingSession
+    from palpate.viewer.live import Preparation, Prepared, PreparingSession, open_viewer
     from palpate.viewer.server import ViewerServer
 
     require_body(file)

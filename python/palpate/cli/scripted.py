@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from palpate.scene import BuiltScene
-from palpate.scene.press_place import press_place
+from palpate.scene.build import press_place
 from palpate.scene.series import with_whole_series
 from palpate.simulation import Frame, Simulation
 

@@ -126,7 +126,7 @@ def doctor(
     """
     if plot is not None:
         require_writable(plot, Error)
-    from palpate.validation import doctor as module
+    from palpate.validation.doctor import report as module
 
     with progress_reporter("running the loop", True) as bar:
         report = None if bar is None else lambda passed: bar(round(10 * passed), round(10 * seconds))

@@ -1,26 +1,5 @@
 """Haptic devices: those defined by a program, those found by the drivers, and the self-check of one."""
 
-from palpate.devices.device import Device
-from palpate.devices.listing import FoundDevice, Listing, Obstacle, kinds, listed, listings
-from palpate.devices.reading import DeviceLimits, Reading
+from palpate.devices.device import Device, DeviceLimits, Reading
+from palpate.devices.listing import FoundDevice, Listing, Obstacle, UsbDevice, kinds, listed, listings, usb_devices
 from palpate.devices.self_check import DIRECTIONS, Checked, Push, SelfCheck, Watched
-from palpate.devices.usb import UsbDevice, usb_devices
-
-__all__ = [
-    "DIRECTIONS",
-    "Checked",
-    "Device",
-    "DeviceLimits",
-    "FoundDevice",
-    "Listing",
-    "Obstacle",
-    "Push",
-    "Reading",
-    "SelfCheck",
-    "UsbDevice",
-    "Watched",
-    "kinds",
-    "listed",
-    "listings",
-    "usb_devices",
-]

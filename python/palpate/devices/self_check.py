@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 
 from palpate import _native
-from palpate.devices.device import Device
-from palpate.devices.reading import DeviceLimits
+from palpate.devices.device import Device, DeviceLimits
 from palpate.errors import DeviceError
 
 # Directions that forces are tried in, with the words for them: x to the right, y away from the person, z up.

@@ -1,23 +1,91 @@
-"""Newmark's scheme: a body in motion under given forces."""
+"""Newmark's scheme: a body in motion under given forces, its damping and its energies."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
 from palpate import _native, units
 from palpate.body import Body
-from palpate.dynamics.basis import ModalBasis, basis_key
+from palpate.dynamics.basis import ZERO_EIGENVALUE, Matrices, ModalBasis, basis_key, native, start_vector
 from palpate.dynamics.basis import modes as compute_modes
-from palpate.dynamics.energy import Energy
-from palpate.dynamics.matrices import Matrices, native
-from palpate.dynamics.residual import Residual
+from palpate.equality import ComparedByValue
 from palpate.errors import BodyError
 from palpate.units import brief_repr
 from palpate.vectors import number, number_array, three_numbers
 
 METHODS = ("modal", "sparse", "dense", "exponential")
+
+
+@dataclass(frozen=True, eq=False)
+class Energy(ComparedByValue):
+    """Energies of a body in motion, J: numbers, or arrays over the ticks of a recording.
+
+    Attributes
+    ----------
+    kinetic, strain
+        `v M v / 2` and `u K u / 2` now.
+    coupling
+        Of the springs between tools and body now; zero where forces are given.
+    dissipated
+        Taken out by damping since the start.
+    work
+        Done by forces, tools and strikes since the start.
+
+    """
+
+    kinetic: float | np.ndarray
+    strain: float | np.ndarray
+    coupling: float | np.ndarray
+    dissipated: float | np.ndarray
+    work: float | np.ndarray
+
+    @property
+    def total(self) -> float | np.ndarray:
+        """Energy of the body and its couplings now, `kinetic + strain + coupling`, J."""
+        return self.kinetic + self.strain + self.coupling
+
+
+def rayleigh_from_ratios(xi1: float, f1: float, xi2: float, f2: float) -> tuple[float, float]:
+    """Factors of `B = a M + b K` that give two frequencies their damping ratios.
+
+    A mode of angular frequency `w` has the ratio `xi = a / (2 w) + b w / 2`; two of them are two equations for a and b.
+
+    Parameters
+    ----------
+    xi1, f1
+        Ratio to critical damping at the frequency f1, Hz.
+    xi2, f2
+        The same at another frequency.
+
+    Returns
+    -------
+    tuple[float, float]
+        a in 1/s and b in s.
+
+    Raises
+    ------
+    BodyError
+        Equal or non-positive frequencies, or ratios so far apart that a factor would be negative.
+
+    """
+    values = (xi1, f1, xi2, f2)
+    if not all(np.isfinite(v) for v in values) or min(f1, f2) <= 0 or f1 == f2 or min(xi1, xi2) < 0:
+        raise BodyError(f"two different positive frequencies and two ratios of at least 0 are needed, got {values}")
+    w1, w2 = 2 * np.pi * f1, 2 * np.pi * f2
+    difference = w2**2 - w1**2
+    a = 2 * w1 * w2 * (xi1 * w2 - xi2 * w1) / difference
+    b = 2 * (xi2 * w2 - xi1 * w1) / difference
+    if min(a, b) < 0:
+        low, high = sorted((f1 / f2, f2 / f1))
+        raise BodyError(
+            f"ratios of {xi1} at {f1} Hz and {xi2} at {f2} Hz need a negative factor, which would add energy "
+            f"at other frequencies: the quotient of the ratios must lie between {low:.4g} and {high:.4g}"
+        )
+    return float(a), float(b)
 
 
 class Newmark:
@@ -267,3 +335,65 @@ class Newmark:
 
 def _dofs(nodes: Sequence[int]) -> np.ndarray:
     return (3 * np.asarray(nodes, dtype=np.int64)[:, None] + np.arange(3)).ravel()
+
+
+class Residual:
+    """Residual flexibility of a basis: the static response of the modes that a truncated one leaves out.
+
+    `R = Psi - Phi diag(1/omega^2) Phi^T` over the elastic modes kept, `Psi` being the static compliance. Its modes are
+    so fast against the load that they follow it statically; with it, a constant load ends at the static solution for
+    any number of modes. For a body that can move freely, `Psi` is the compliance to self-balanced loads, seen without
+    rigid motion. The load is balanced by the inertia of the rigid motions first, and their share is removed from the
+    answer.
+
+    Raises
+    ------
+    BodyError
+        A body that can move freely, and a basis without all of its rigid motions.
+
+    """
+
+    def __init__(self, matrices: Matrices, basis: ModalBasis):
+        self._free = matrices.free
+        self._shapes = basis.shapes.reshape(-1, len(basis))[matrices.free]
+        self._eigenvalues = basis.eigenvalues
+        rigid = basis.eigenvalues == 0.0
+        self._rigid = self._shapes[:, rigid]
+        self._mass_rigid = matrices.free_mass @ self._rigid
+        # As many dofs are fixed as there are rigid motions, those that determine them best (pivoted QR).
+        order = scipy.linalg.qr(self._rigid.T, mode="r", pivoting=True)[1] if rigid.any() else np.empty(0, dtype=int)
+        pinned = order[: self._rigid.shape[1]]
+        self._kept = np.setdiff1d(np.arange(len(self._free)), pinned)
+        fixed = np.union1d(matrices.fixed, self._free[pinned])
+        lacking = f"a truncated basis needs all rigid motions of the body; the first {len(basis)} modes lack some"
+        try:
+            self._factor = _native.SparseFactor(native(matrices.stiffness), fixed.tolist())
+        except BodyError:
+            raise BodyError(lacking) from None
+        if rigid.any() and self._is_loose(matrices):
+            raise BodyError(lacking)
+
+    def _is_loose(self, matrices: Matrices) -> bool:
+        """Whether the pinned body can still move as a rigid one: round-off may give a singular matrix a factor.
+
+        A step of inverse iteration then ends at that motion, whose Rayleigh quotient is round-off.
+        """
+        moved = np.zeros(len(self._free))
+        moved[self._kept] = self._factor.solve(start_vector(len(self._kept)))
+        quotient = (moved @ (matrices.free_stiffness @ moved)) / (moved @ (matrices.free_mass @ moved))
+        scale = (matrices.free_stiffness.diagonal() / matrices.free_mass.diagonal()).max()
+        return bool(quotient < ZERO_EIGENVALUE * scale)
+
+    def answer(self, forces: np.ndarray) -> np.ndarray:
+        """Displacements (3n), m, that the modes leave out under forces (3n), N."""
+        load = forces[self._free]
+        balanced = load - self._mass_rigid @ (self._rigid.T @ load)
+        answer = np.zeros(len(self._free))
+        answer[self._kept] = self._factor.solve(balanced[self._kept])
+        answer -= self._rigid @ (self._mass_rigid.T @ answer)
+        modal = self._shapes.T @ load
+        elastic = self._eigenvalues > 0.0
+        answer -= self._shapes[:, elastic] @ (modal[elastic] / self._eigenvalues[elastic])
+        everywhere = np.zeros(len(forces))
+        everywhere[self._free] = answer
+        return everywhere

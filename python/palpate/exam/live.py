@@ -14,10 +14,9 @@ from palpate.exam.plot import plot_exam
 from palpate.exam.record import Record
 from palpate.exam.result import Result
 from palpate.scene import BuiltScene
-from palpate.viewer.background import CancellableTask
 from palpate.viewer.messages import flag
 from palpate.viewer.server import Client, ViewerServer
-from palpate.viewer.status import error_message
+from palpate.viewer.status import CancellableTask, error_message
 
 # The tone is as loud as it gets at so many times the force over plain tissue at the exam's depth.
 LOUDEST = 3.0

@@ -10,7 +10,7 @@ import numpy as np
 from palpate.exam.course import Course
 from palpate.exam.psychometric import proportion_correct
 from palpate.exam.result import Result, fraction_text, percent
-from palpate.validation.plots import COLORS, empty_figure, write_figure
+from palpate.figures import COLORS, empty_figure, write_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

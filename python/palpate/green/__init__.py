@@ -6,15 +6,3 @@ from palpate.green.bounds import error_text
 from palpate.green.function import GreensFunction, require_precise
 from palpate.green.plan import Plan, plan
 from palpate.green.precompute import precompute
-
-__all__ = [
-    "Answer",
-    "BackgroundPrecompute",
-    "GreensFunction",
-    "Plan",
-    "Touch",
-    "error_text",
-    "plan",
-    "precompute",
-    "require_precise",
-]

@@ -18,9 +18,8 @@ from palpate.body import Body, SurfaceRegion, surface_region
 from palpate.errors import BodyError, StoreError, StoreWarning
 from palpate.green.bounds import CHOSEN
 from palpate.green.child_process import end_child, send_job, send_line, start_child
-from palpate.green.claim import waiting_message
 from palpate.green.function import GreensFunction
-from palpate.green.job import Job
+from palpate.green.job import Job, waiting_message
 
 # The child gives way to everything else once a force loop runs.
 NICEST = 19
@@ -78,11 +77,11 @@ class BackgroundPrecompute:
             self._touchable = self._unfetched.touchable_nodes
         memory = job.allowed(None)
         job.make_room()
-        self._child = child = start_child("palpate.green.child")
-        names = ("arguments", "precision_name", "within", "description", "path", "memory", "first", "key")
-        values = (job.problem, precision, CHOSEN, job.description, job.target, memory, job.first, job.key)
+        self._child = child = start_child("columns")
         assert child.stdin is not None and child.stdout is not None
         self._input = child.stdin
+        names = ("arguments", "precision_name", "within", "description", "path", "memory", "first", "key")
+        values = (job.problem, precision, CHOSEN, job.description, job.target, memory, job.first, job.key)
         send_job(self._input, dict(zip(names, values, strict=True)))
         self._listener = threading.Thread(
             target=self._listen, args=(child.stdout,), name="palpate-columns", daemon=True
@@ -232,9 +231,3 @@ class BackgroundPrecompute:
         self._listener.join()
         assert self._child.stdout is not None
         self._child.stdout.close()
-
-    def __enter__(self) -> BackgroundPrecompute:
-        return self
-
-    def __exit__(self, *_exception: object) -> None:
-        self.close()

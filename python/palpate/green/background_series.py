@@ -10,7 +10,6 @@ import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
-from pathlib import Path
 
 from palpate import _native
 from palpate.green.background import NICEST
@@ -121,7 +120,7 @@ class BackgroundSeries:
         seen = self._look(number, file, None)
         if self._counts[number][0] == self._counts[number][1] > 0:
             return
-        child = start_child("palpate.green.series_child")
+        child = start_child("series")
         assert child.stdin is not None and child.stdout is not None
         listener = threading.Thread(target=self._listen, args=(number, child.stdout), daemon=True)
         listener.start()
@@ -155,9 +154,10 @@ class BackgroundSeries:
     def _look(self, number: int, file: _native.SeriesFile, seen: tuple[int, int] | None) -> tuple[int, int] | None:
         """Take what is in the file, if that has changed; return what tells this state of the file from others."""
         try:
-            now = _identity(file.path)
+            status = file.path.stat()
         except OSError:
             return seen
+        now = status.st_ino, status.st_mtime_ns
         if now == seen:
             return seen
         series = file.load()
@@ -190,8 +190,3 @@ def _arguments(job: SeriesJob) -> dict[str, object]:
         # One processor is left to the loop.
         "cpus": ours[1:] or ours,
     }
-
-
-def _identity(path: Path) -> tuple[int, int]:
-    status = path.stat()
-    return status.st_ino, status.st_mtime_ns

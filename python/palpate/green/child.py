@@ -1,18 +1,21 @@
-"""Child process that computes columns beside a running force loop: ``python -m palpate.green.child``.
+"""Child processes that compute beside a running force loop: ``python -m palpate.green.child columns``, or ``series``.
 
-After the job it is given the nodes of every region that is to come next. What is finished stays in the partial file.
+After the job, one of columns is given the nodes of every region that is to come next; what is finished stays in the
+partial file. One of a series is given a point, m, whenever a tool has moved: places near the point come first.
 """
 
 from __future__ import annotations
 
 import contextlib
+import os
+import sys
 import threading
 from pathlib import Path
 
 from palpate import _native
 from palpate.errors import Error
 from palpate.green.child_process import compute_and_exit, progress_sender, received_job, received_lines, send
-from palpate.green.claim import claimed
+from palpate.green.job import claimed
 
 
 class _NextNodes:
@@ -63,8 +66,19 @@ def _is_finished(path: Path, key: str) -> bool:
     return True
 
 
-def main() -> None:
-    """Compute what standard input asks for."""
+def _follow(file: _native.SeriesFile) -> None:
+    for point in received_lines():
+        file.set_near(tuple(point))
+
+
+def _yield_processor(nice: int, cpus: list[int]) -> None:
+    with contextlib.suppress(OSError, AttributeError):
+        os.nice(nice)
+        os.sched_setaffinity(0, cpus)
+
+
+def compute_columns() -> None:
+    """Compute the columns that standard input asks for."""
     arguments = received_job()
     growth = (arguments.pop("first"), _NextNodes().take, lambda nodes: send(ready=nodes))
     key, path = arguments.pop("key"), arguments["path"]
@@ -78,5 +92,19 @@ def main() -> None:
     compute_and_exit(compute, path)
 
 
+def compute_series() -> None:
+    """Compute the series that standard input asks for."""
+    given = received_job()
+    _yield_processor(given["nice"], given["cpus"])
+    file = _native.SeriesFile(given["laws"], given["radius"], given["store"], given["key"])
+    threading.Thread(target=_follow, args=(file,), daemon=True).start()
+
+    def compute() -> None:
+        with claimed(file.path, lambda: None):
+            file.compute(given["problem"], progress_sender("places"))
+
+    compute_and_exit(compute, given["store"])
+
+
 if __name__ == "__main__":
-    main()
+    {"columns": compute_columns, "series": compute_series}[sys.argv[1]]()

@@ -21,12 +21,11 @@ from palpate.errors import Error
 PATIENCE = 2.0
 
 
-def start_child(module: str) -> subprocess.Popen[bytes]:
-    """Start a module as a child with pipes to its standard input and output."""
+def start_child(what: str) -> subprocess.Popen[bytes]:
+    """Start a child that computes ``columns`` or a ``series``, with pipes to its standard input and output."""
+    command = [sys.executable, "-m", "palpate.green.child", what]
     # In a session of its own: Ctrl-C in a terminal is for this process, which ends the child.
-    return subprocess.Popen(
-        [sys.executable, "-m", module], stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
-    )
+    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True)
 
 
 def end_child(child: subprocess.Popen[bytes]) -> None:

@@ -14,15 +14,14 @@ from typing import Any
 import numpy as np
 
 from palpate import _native, units
-from palpate.atomic import destination
+from palpate.atomic import destination, remove_leftovers
 from palpate.body import Body, description, problem_arrays
-from palpate.cache_limit import hold
+from palpate.cache import hold
 from palpate.errors import BodyError, StoreError, TouchWarning
 from palpate.fields import STRAIN_LIMIT, ElementStrain, StrainMeasure, StressRecovery, SurfaceStrain
 from palpate.green.answer import Answer, Touch
 from palpate.green.bounds import check_error
 from palpate.input_file import require_file
-from palpate.leftovers import remove_leftovers
 from palpate.mesh import size_text
 from palpate.units import brief_repr
 from palpate.vectors import Reader, brief, three_components, three_numbers

@@ -23,11 +23,7 @@ Report = Callable[[int, int], None] | None
 
 
 def precompute_on(
-    client: Client,
-    what: Job,
-    claim: _native.StoreClaim,
-    memory: int | str | None,
-    report: Report,
+    client: Client, what: Job, claim: _native.StoreClaim, memory: int | str | None, report: Report
 ) -> bool:
     """Write the Green's function that is claimed; whether a partial file of something else was thrown away.
 
@@ -75,11 +71,7 @@ def _first(client: Client, futures: list[Future]) -> tuple[tuple[Any, ...], byte
 
 
 def series_on(
-    client: Client,
-    problem: worker.Arrays,
-    job: worker.SeriesRequest,
-    file: _native.SeriesFile,
-    report: Report,
+    client: Client, problem: worker.Arrays, job: worker.SeriesRequest, file: _native.SeriesFile, report: Report
 ) -> _native.Series:
     """Complete a series. Finished blocks are kept in its file, whatever happens to the cluster.
 

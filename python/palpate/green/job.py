@@ -1,30 +1,34 @@
-"""A precomputation to be run: its problem, its target file, and the checks of memory and disk space."""
+"""A precomputation to be run: its problem, its target file, the checks of memory and disk space.
+
+One process at a time writes a store, others wait.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import json
 import os
+import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from palpate import _native
-from palpate.atomic import destination
+from palpate.atomic import destination, remove_leftovers
 from palpate.body import Body, SurfaceRegion, description, problem_arrays, surface_region
-from palpate.cache import cache_directory
-from palpate.cache_limit import make_room
+from palpate.cache import cache_directory, make_room
 from palpate.errors import BodyError, StoreError
-from palpate.green.disk import DiskUse, require_room
 from palpate.green.function import GreensFunction
-from palpate.green.memory import allowed_memory, available_memory
+from palpate.green.resources import DiskUse, allowed_memory, available_memory, require_room
 from palpate.input_file import require_writable
-from palpate.leftovers import remove_leftovers
 from palpate.units import brief_repr
 
 # Number formats of stores.
 PRECISIONS = ("f16", "f32", "f64")
+# Between two attempts to claim a store, s.
+PAUSE = 0.1
 
 
 @dataclass(frozen=True)
@@ -123,3 +127,23 @@ def _require_store(path: Path) -> None:
     # Length of the header, and the header in JSON, as of safetensors.
     if not start[8:].startswith(b'{"__metadata__"'):
         raise StoreError(f"{path}: exists, and is no store: give another name, or delete it first")
+
+
+@contextlib.contextmanager
+def claimed(target: Path, waiting: Callable[[], None]) -> Iterator[_native.StoreClaim]:
+    """Claim the store at ``target`` until the block ends, as soon as no other process computes it.
+
+    ``waiting`` is called before every pause. Raises OSError if no file can be written there.
+    """
+    while (claim := _native.StoreClaim.take(target)) is None:
+        waiting()
+        time.sleep(PAUSE)
+    try:
+        yield claim
+    finally:
+        claim.release()
+
+
+def waiting_message(target: Path) -> str:
+    """Message for the time of waiting."""
+    return f"another process is computing {target}: waiting for it"

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any
 from palpate import _native, units
 from palpate.body import Body, SurfaceRegion
 from palpate.errors import BodyError
-from palpate.green.disk import DiskUse, free_bytes
 from palpate.green.job import Job
-from palpate.green.memory import memory_in_use
+from palpate.green.resources import DiskUse, free_bytes, memory_in_use
 from palpate.green.series import SeriesJob
 from palpate.units import brief_repr
 

@@ -18,10 +18,9 @@ from palpate.cluster import connected
 from palpate.errors import ClusterError, PrecisionWarning, StoreError, StoreWarning, TouchWarning
 from palpate.fields import STRAIN_LIMIT
 from palpate.green.bounds import CHOSEN, WARNED, error_text, remedy
-from palpate.green.claim import claimed, waiting_message
 from palpate.green.function import GreensFunction
 from palpate.green.gathering import precompute_on
-from palpate.green.job import Job
+from palpate.green.job import Job, claimed, waiting_message
 from palpate.progress import progress_reporter
 
 if TYPE_CHECKING:

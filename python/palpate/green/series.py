@@ -15,10 +15,9 @@ from palpate.body import Body, problem_arrays
 from palpate.body.material import element_laws
 from palpate.cluster import connected
 from palpate.errors import StoreError
-from palpate.green.claim import claimed
 from palpate.green.function import GreensFunction
 from palpate.green.gathering import series_on
-from palpate.green.job import Job
+from palpate.green.job import Job, claimed
 from palpate.green.worker import SeriesRequest
 
 if TYPE_CHECKING:

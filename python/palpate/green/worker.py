@@ -13,7 +13,7 @@ from palpate import _native
 from palpate.cluster import require_version
 from palpate.errors import ClusterError
 from palpate.green.bounds import CHOSEN
-from palpate.green.memory import allowed_memory
+from palpate.green.resources import allowed_memory
 
 # A factor that nobody has asked for a block for so long is let go, s: its computation has gone elsewhere, or died.
 IDLE = 60.0

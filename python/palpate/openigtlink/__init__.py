@@ -1,11 +1,8 @@
 """OpenIGTLink: tool poses of trackers and 3D Slicer in; poses, contacts and forces out.
 
-``messages`` packs and reads messages, ``axes`` converts to millimetres and the patient's axes, ``peer`` is one
-connection with bounded memory, ``server`` the thread that serves them all, ``link`` what it does with a simulation.
+``messages`` packs and reads messages, ``server`` is the thread that serves all connections, ``link`` what it does with
+a simulation, in millimetres and the patient's axes.
 """
 
-from palpate.openigtlink.axes import Axes
-from palpate.openigtlink.link import Link
+from palpate.openigtlink.link import Axes, Link
 from palpate.openigtlink.server import LinkServer
-
-__all__ = ["Axes", "Link", "LinkServer"]

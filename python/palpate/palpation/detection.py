@@ -17,17 +17,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.body import Body
+from palpate.equality import ComparedByValue
 from palpate.errors import SceneError
+from palpate.fields import write_result
+from palpate.figures import write_figure
 from palpate.mesh import size_text
-from palpate.palpation import files, pictures
+from palpate.palpation import pictures
 from palpate.palpation.protocol import Protocol, Sites, closest
-from palpate.palpation.records import DetectionRecord, Nodule
+from palpate.palpation.records import XYZ, Nodule, surface_mesh, write_columns, write_rows
 from palpate.palpation.runs import probe
 from palpate.palpation.stiffness_map import StiffnessMap, palpated
 from palpate.scene import BuiltScene, Scene
 from palpate.scene.regions import MaterialTable, RegionTable
 from palpate.scene.tables import SceneTables
 from palpate.simulation import Simulation
+from palpate.units import count_text
 
 if TYPE_CHECKING:
     import meshio
@@ -42,10 +46,11 @@ LEAST_CHANGE, LEAST_PART = 0.02, 0.25
 AROUND, FEWEST, SAME_SIDE = 2.5, 6, 0.5
 # Surfaces that lie farther apart than this part of the body's longest side are not of the same body.
 SAME_SURFACE = 0.01
+DETECTION_FILES = ("detection.csv", "nodules.csv", "detection.vtu", "detection.png")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Detection(DetectionRecord):
+class Detection(ComparedByValue):
     """A map beside that of a body without anything hidden. Compared by value, number by number; not hashable.
 
     Attributes
@@ -59,19 +64,28 @@ class Detection(DetectionRecord):
 
     """
 
+    found: StiffnessMap
+    plain: StiffnessMap
+    ratio: np.ndarray
+    difference: np.ndarray
+    nodules: tuple[Nodule, ...]
+
     def __repr__(self) -> str:
-        count = f"{len(self.nodules)} nodule{'' if len(self.nodules) == 1 else 's'}"
+        count = count_text(len(self.nodules), "nodule")
         known = self.ratio[np.isfinite(self.ratio)]
         range_text = f", ratios {known.min():.3g} to {known.max():.3g}" if len(known) else ""
         return f"Detection({count}{range_text})"
 
     def to_meshio(self) -> meshio.Mesh:
         """Give :meth:`StiffnessMap.to_meshio` with ``plain_stiffness``, ``difference``, N/m, and ``ratio``."""
-        return files.mesh_of_detection(self)
+        found, plain = self.found, self.plain
+        maps = {"stiffness": found.stiffness, "secant_stiffness": found.secant_stiffness}
+        compared = {"plain_stiffness": plain.stiffness, "difference": self.difference, "ratio": self.ratio}
+        return surface_mesh(found, maps | compared)
 
     def plot(self) -> Figure:
         """Picture of the ratio on the surface with the nodules, as a figure of matplotlib."""
-        return pictures.picture_of_detection(self)
+        return pictures.picture_of_ratio(self.found, self.ratio, self.nodules)
 
     def save(self, folder: str | os.PathLike[str]) -> list[Path]:
         """Write it into a folder, which is made.
@@ -82,7 +96,24 @@ class Detection(DetectionRecord):
             The files: ``detection.csv``, ``nodules.csv``, ``detection.vtu``, ``detection.png``.
 
         """
-        return files.save_detection(self, Path(folder))
+        where, found = Path(folder), self.found
+        where.mkdir(parents=True, exist_ok=True)
+        table, nodules, surface, picture = paths = [where / name for name in DETECTION_FILES]
+        columns = {
+            "point": np.arange(len(found.points)),
+            **dict(zip(XYZ, found.points.T, strict=True)),
+            "stiffness_N_per_m": found.stiffness,
+            "plain_stiffness_N_per_m": self.plain.stiffness,
+            "ratio": self.ratio,
+            "difference_N_per_m": self.difference,
+        }
+        write_columns(table, columns)
+        names = ("body", *XYZ, "ratio", "difference_N_per_m", "half_width_m", "point")
+        rows = ((n.body, *n.place, n.ratio, n.difference, n.half_width, n.point) for n in self.nodules)
+        write_rows(nodules, names, rows)
+        write_result(self.to_meshio(), surface)
+        write_figure(self.plot(), picture, grid=False)
+        return paths
 
 
 def homogeneous(scene: SceneTables) -> SceneTables | None:

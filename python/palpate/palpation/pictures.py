@@ -10,7 +10,7 @@ import numpy as np
 from palpate.figures import empty_figure
 from palpate.mesh import size_text
 from palpate.mesh.triangles import area_vectors, node_normals, units
-from palpate.palpation.records import DetectionRecord, MapRecord, Nodule
+from palpate.palpation.records import MapRecord, Nodule
 from palpate.palpation.sides import plane_axes
 
 if TYPE_CHECKING:
@@ -37,13 +37,13 @@ def picture_of_map(found: MapRecord) -> Figure:
     return _picture(found, found.stiffness, title, "stiffness [N/m]", "viridis", None, ())
 
 
-def picture_of_detection(detection: DetectionRecord) -> Figure:
-    """Stiffness over that of the plain body, and the nodules."""
-    values = 100 * (detection.ratio - 1)
+def picture_of_ratio(found: MapRecord, ratio: np.ndarray, nodules: Sequence[Nodule]) -> Figure:
+    """Stiffness over that of the plain body, (p,), and the nodules."""
+    values = 100 * (ratio - 1)
     known = values[np.isfinite(values)]
     end = max(float(np.abs(known).max(initial=0.0)), 1.0)
-    title = f"stiffness over that of the plain body, at {1e3 * detection.found.depth:.3g} mm depth"
-    return _picture(detection.found, values, title, "change [%]", "coolwarm", (-end, end), detection.nodules)
+    title = f"stiffness over that of the plain body, at {1e3 * found.depth:.3g} mm depth"
+    return _picture(found, values, title, "change [%]", "coolwarm", (-end, end), nodules)
 
 
 def picture_of_curves(found: MapRecord) -> Figure:

@@ -1,4 +1,4 @@
-"""One press: the path of the tool, and the stiffness found from its force.
+"""Presses: the path of the tool, and the stiffness found from its force.
 
 The tool comes along the inward normal until it has gone `d` beyond first touch. With the component `F` of its force
 along the outward normal,
@@ -11,22 +11,24 @@ Hertz's sphere on a half-space has `F = 4/3 E* sqrt(R) d^(3/2)`: `dF/dd = 2 E* s
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from palpate.palpation.protocol import Protocol, Sites
+from palpate.palpation.records import PressCurve
+from palpate.palpation.runs import Path3D, Run
+from palpate.simulation import Simulation
 from palpate.vectors import turning_z_to
-
-if TYPE_CHECKING:
-    from palpate.palpation.protocol import Protocol
-    from palpate.simulation import Simulation
 
 # A press begins this part of its depth above the surface. Force so early, of this part of the largest, is that of
 # another place of the body.
 CLEARANCE, EARLY, EARLY_FORCE = 0.25, 0.1, 0.02
 # The slope is that of the last part of the depth.
 LAST_PART = 0.2
+# A device puts out its largest force to within rounding.
+CLAMPED = 1 - 1e-9
 
 STRAIN_LIMIT, FORCE_LIMIT, OTHER_PLACE, NO_CONTACT = "strain limit", "force limit", "other place", "no contact"
 
@@ -69,16 +71,16 @@ def measured(
     """Read a press: forces along the normal (t,), N, where strain and where force was limited (t,)."""
     early = normal_forces[depths < -EARLY * depth]
     if np.abs(early).max(initial=0.0) > EARLY_FORCE * np.abs(normal_forces).max():
-        return _no_contact(OTHER_PLACE, 0.0, 0.0)
+        return not_measured(OTHER_PLACE, 0.0, 0.0)
     if normal_forces[-1] <= 0:
-        return _no_contact(NO_CONTACT, 0.0, 0.0)
+        return not_measured(NO_CONTACT, 0.0, 0.0)
     held = limited | clamped
     window = depths >= (1 - LAST_PART) * depth
     if held[window].any():
         free = np.flatnonzero(~held[depths > 0]) + int((depths <= 0).sum())
         last = int(free[-1]) if len(free) else 0
         reached = (float(depths[last]), float(normal_forces[last])) if len(free) else (0.0, 0.0)
-        return _no_contact(STRAIN_LIMIT if limited[window].any() else FORCE_LIMIT, *reached)
+        return not_measured(STRAIN_LIMIT if limited[window].any() else FORCE_LIMIT, *reached)
     force, stiffness = value_and_slope(depths[window], normal_forces[window], depth)
     return Measured(force, stiffness, force / depth, "", depth, force)
 
@@ -90,5 +92,37 @@ def value_and_slope(depths: np.ndarray, forces: np.ndarray, at: float) -> tuple[
     return float(value), float(slope / np.ptp(depths))
 
 
-def _no_contact(held_by: str, depth: float, force: float) -> Measured:
+def not_measured(held_by: str, depth: float, force: float) -> Measured:
+    """Return a press that something held: what, and the depth, m, and the force, N, up to which nothing did."""
     return Measured(np.nan, np.nan, np.nan, held_by, depth, force)
+
+
+def press_paths(simulation: Simulation, sites: Sites, protocol: Protocol) -> list[Path3D]:
+    """Path of the tool for each press, along the inward normal."""
+    depths = depths_of(protocol, simulation.scene.device.rate)
+    turned, reach = standing_on(simulation, sites.normals)
+    return [
+        Path3D(point + (reach - depths)[:, None] * normal, np.repeat(orientation[None], len(depths), axis=0))
+        for point, normal, orientation in zip(sites.points, sites.normals, turned, strict=True)
+    ]
+
+
+def read_presses(
+    simulation: Simulation, protocol: Protocol, sites: Sites, runs: Sequence[Run]
+) -> tuple[list[Measured], list[PressCurve]]:
+    """Read the result of each press, and its curve."""
+    rate = simulation.scene.device.rate
+    depths = depths_of(protocol, rate)
+    time = np.arange(len(depths)) / rate
+    found, curves = [], []
+    for (forces, limited), normal in zip(runs, sites.normals, strict=True):
+        clamped = clamped_ticks(simulation, forces)
+        normal_forces = forces @ normal
+        found.append(measured(depths, normal_forces, limited, clamped, protocol.depth))
+        curves.append(PressCurve(time, depths, np.zeros(len(depths)), forces, normal_forces, limited | clamped))
+    return found, curves
+
+
+def clamped_ticks(simulation: Simulation, forces: np.ndarray) -> np.ndarray:
+    """Mask (t,) of the ticks in which a device puts out its largest force, of forces (t, 3), N."""
+    return np.linalg.norm(forces, axis=1) >= CLAMPED * simulation.scene.device.max_force

@@ -12,8 +12,7 @@ from palpate import units
 from palpate.body import parse
 from palpate.errors import SceneError
 from palpate.mesh import size_text
-from palpate.palpation.sampling import MOST_POINTS, evenly_on, lattice_on, too_many
-from palpate.palpation.sides import SurfaceShape
+from palpate.palpation.sides import MOST_POINTS, SurfaceShape, evenly_on, lattice_on, too_many
 from palpate.simulation import Simulation
 from palpate.vectors import brief, three_numbers
 

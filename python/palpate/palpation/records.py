@@ -1,16 +1,56 @@
-"""Record classes of a palpation's results."""
+"""Records of a palpation's results, interpolation at scattered places of a surface, and what their files share."""
 
 from __future__ import annotations
 
+import csv
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from palpate.atomic import written_beside
 from palpate.equality import ComparedByValue
 from palpate.mesh.triangles import node_normals
-from palpate.palpation.interpolation import SurfaceField
 from palpate.palpation.sides import SurfaceShape
 from palpate.scene import BuiltScene
+
+if TYPE_CHECKING:
+    import meshio
+
+# Share of normals in the distance, by spacings; how far from the closest place values are known, in spacings: out to
+# the corner of a square lattice's last cell, and over an edge half-way round.
+NORMALS, KNOWN = 1.2, 1.6
+NEIGHBOURS = 24
+XYZ = ("x_m", "y_m", "z_m")
+
+
+def joined(points: np.ndarray, normals: np.ndarray, spacing: float) -> np.ndarray:
+    """Points (n, 3), m, and unit normals (n, 3) as places (n, 6), whose distances count in spacings, m."""
+    return np.hstack([points / spacing, NORMALS * normals])
+
+
+def interpolated(asked: np.ndarray, places: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Values (n,) at places (n, 6) of :func:`joined`, from those (p,) at others (p, 6), NaN where nothing is known.
+
+    Interpolated by radial basis functions, `sum w_i |x - x_i| + c`, over the closest places: what was measured stands
+    at its place, between places it is as smooth as that allows. Distances are those of places and normals together, so
+    that the far side of a thin part, or the next side beyond an edge, takes nothing from this one. NaN where no place
+    is near.
+    """
+    from scipy.interpolate import RBFInterpolator
+    from scipy.spatial import cKDTree
+
+    known = np.isfinite(values)
+    found = np.full(len(asked), np.nan)
+    if known.any():
+        near = cKDTree(places[known]).query(asked)[0] < KNOWN
+        if near.any():
+            neighbours = min(NEIGHBOURS, int(known.sum()))
+            fit = RBFInterpolator(places[known], values[known], neighbours, kernel="linear", degree=0)
+            found[near] = fit(asked[near])
+    return found
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -70,7 +110,8 @@ class MapRecord(ComparedByValue):
         ``values`` (p,) takes other values at the points in its place.
         """
         known = self.stiffness if values is None else values
-        return SurfaceField(self.points, self.normals, known, self.spacing).at(points, normals)
+        places = joined(self.points, self.normals, self.spacing)
+        return interpolated(joined(points, normals, self.spacing), places, known)
 
     def surfaces(self) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """Of each body, in the scene: positions (s, 3), m, normals (s, 3), and triangles (t, 3) as rows of them."""
@@ -109,12 +150,36 @@ class Nodule(ComparedByValue):
     half_width: float
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class DetectionRecord(ComparedByValue):
-    """What a comparison holds; :class:`palpate.palpation.Detection` describes each field."""
+def surface_mesh(found: MapRecord, values: Mapping[str, np.ndarray]) -> meshio.Mesh:
+    """Surfaces of all bodies in the scene, with values (p,) at points taken to their nodes."""
+    import meshio
 
-    found: MapRecord
-    plain: MapRecord
-    ratio: np.ndarray
-    difference: np.ndarray
-    nodules: tuple[Nodule, ...]
+    positions, cells, data, of_body = [], [], {name: [] for name in values}, []
+    start = 0
+    for body, (places, normals, triangles) in enumerate(found.surfaces()):
+        own = found.bodies == body
+        for name, at_points in values.items():
+            data[name].append(found.at(places, normals, np.where(own, at_points, np.nan)))
+        positions.append(places)
+        cells.append(("triangle", start + triangles))
+        of_body.append(np.full(len(triangles), body))
+        start += len(places)
+    joined = {name: np.concatenate(parts) for name, parts in data.items()}
+    return meshio.Mesh(np.vstack(positions), cells, point_data=joined, cell_data={"body": of_body})
+
+
+def write_columns(path: Path, columns: Mapping[str, Sequence[Any]]) -> None:
+    """Write columns of one length as CSV."""
+    write_rows(path, columns, zip(*columns.values(), strict=True))
+
+
+def write_rows(path: Path, names: Iterable[str], rows: Iterable[Sequence[Any]]) -> None:
+    """Write rows as CSV below names, numbers with nine digits; beside, then renamed."""
+    with written_beside(path) as partial, partial.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(names)
+        writer.writerows([_text(value) for value in row] for row in rows)
+
+
+def _text(value: Any) -> str:
+    return f"{value:.9g}" if isinstance(value, (float, np.floating)) else str(value)

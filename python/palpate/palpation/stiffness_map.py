@@ -10,15 +10,24 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from palpate.atomic import written_beside
 from palpate.errors import SceneError
 from palpate.fields import write_result
-from palpate.palpation import files, pictures
-from palpate.palpation.press import FORCE_LIMIT, NO_CONTACT, OTHER_PLACE, STRAIN_LIMIT, Measured
+from palpate.figures import write_figure
+from palpate.palpation import pictures
+from palpate.palpation.press import (
+    FORCE_LIMIT,
+    NO_CONTACT,
+    OTHER_PLACE,
+    STRAIN_LIMIT,
+    Measured,
+    press_paths,
+    read_presses,
+)
 from palpate.palpation.protocol import Protocol, Sites, sample_sites, sites_at_points
-from palpate.palpation.reading import press_paths, read_presses, read_strokes
-from palpate.palpation.records import MapRecord
+from palpate.palpation.records import XYZ, MapRecord, surface_mesh, write_columns
 from palpate.palpation.runs import probe, run_all
-from palpate.palpation.strokes import Track, strokes_on
+from palpate.palpation.strokes import Track, read_strokes, strokes_on
 from palpate.scene import BuiltScene, Scene
 from palpate.simulation import Simulation
 
@@ -72,7 +81,7 @@ class StiffnessMap(MapRecord):
 
         Point data are ``stiffness`` and ``secant_stiffness``, N/m.
         """
-        return files.mesh_of_map(self)
+        return surface_mesh(self, {"stiffness": self.stiffness, "secant_stiffness": self.secant_stiffness})
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write what :meth:`to_meshio` gives as .vtu or .vtk, for ParaView and the page; a file is replaced at once."""
@@ -80,11 +89,32 @@ class StiffnessMap(MapRecord):
 
     def write_points(self, path: str | os.PathLike[str]) -> None:
         """Write a row for each point as CSV."""
-        files.write_points(self, Path(path))
+        columns = {
+            "point": np.arange(len(self.points)),
+            "body": self.bodies,
+            "stroke": self.strokes,
+            **dict(zip(XYZ, self.points.T, strict=True)),
+            **dict(zip(("normal_x", "normal_y", "normal_z"), self.normals.T, strict=True)),
+            "force_N": self.force,
+            "stiffness_N_per_m": self.stiffness,
+            "secant_stiffness_N_per_m": self.secant_stiffness,
+            "held_by": self.held_by,
+            "reached_depth_m": self.reached_depth,
+            "reached_force_N": self.reached_force,
+        }
+        write_columns(Path(path), columns)
 
     def write_curves(self, path: str | os.PathLike[str]) -> None:
-        """Write a row for each tick of each curve as CSV."""
-        files.write_curves(self, Path(path))
+        """Write a row for each tick of each curve as CSV, with the number of its point or stroke."""
+        of = "stroke" if (self.strokes >= 0).any() else "point"
+        names = (of, "time_s", "position_m", "depth_m", "normal_force_N", "fx_N", "fy_N", "fz_N", "limited")
+        with written_beside(Path(path)) as partial, partial.open("w", encoding="utf-8") as stream:
+            stream.write(",".join(names) + "\n")
+            for rank, curve in enumerate(self.curves):
+                count = np.full(len(curve.time), rank)
+                moved = (curve.time, curve.position, curve.depth, curve.normal_force, *curve.force.T)
+                formats = ["%d", *["%.9g"] * len(moved), "%d"]
+                np.savetxt(stream, np.column_stack([count, *moved, curve.limited]), delimiter=",", fmt=formats)
 
     def plot(self) -> Figure:
         """Picture of the map on the surface, as a figure of matplotlib; ``savefig`` writes it."""
@@ -103,7 +133,16 @@ class StiffnessMap(MapRecord):
             The files: ``points.csv``, ``curves.csv``, ``curves.png``, ``stiffness.vtu``, ``stiffness.png``.
 
         """
-        return files.save_map(self, Path(folder))
+        where = Path(folder)
+        where.mkdir(parents=True, exist_ok=True)
+        names = ("points.csv", "curves.csv", "curves.png", "stiffness.vtu", "stiffness.png")
+        points, curves, curves_picture, surface, picture = paths = [where / name for name in names]
+        self.write_points(points)
+        self.write_curves(curves)
+        write_figure(self.plot_curves(), curves_picture, grid=False)
+        self.write(surface)
+        write_figure(self.plot(), picture, grid=False)
+        return paths
 
 
 def stiffness_map(

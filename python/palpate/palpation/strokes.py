@@ -7,14 +7,24 @@ force over depth is known all along it: `dF/dd = (3 F(d) - 4 F(d - e) + F(d - 2 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from palpate.errors import SceneError
-from palpate.palpation.press import standing_on
+from palpate.palpation.press import (
+    FORCE_LIMIT,
+    NO_CONTACT,
+    STRAIN_LIMIT,
+    Measured,
+    clamped_ticks,
+    not_measured,
+    standing_on,
+)
 from palpate.palpation.protocol import Protocol, Selection, Sites, closest
-from palpate.palpation.runs import Path3D
+from palpate.palpation.records import PressCurve
+from palpate.palpation.runs import Path3D, Run
 from palpate.palpation.sides import Side, distances_to_lines
 from palpate.simulation import Simulation
 
@@ -71,6 +81,36 @@ def slope_of_passes(forces: np.ndarray, protocol: Protocol) -> np.ndarray:
     """Slope of force over depth (t,), N/m, from forces (3, t), N, of the passes."""
     deep, middle, shallow = forces
     return (3 * deep - 4 * middle + shallow) / (2 * DEPTH_STEP * protocol.depth)
+
+
+def read_strokes(
+    simulation: Simulation, protocol: Protocol, tracks: Sequence[Track], runs: Sequence[Run]
+) -> tuple[list[Measured], list[PressCurve]]:
+    """Read the result at each place of each stroke, and the curve of its deepest pass."""
+    rate = simulation.scene.device.rate
+    found, curves = [], []
+    for rank, track in enumerate(tracks):
+        passes = [tuple(part[track.lead :] for part in run) for run in runs[PASSES * rank : PASSES * (rank + 1)]]
+        normal_forces = np.array([np.einsum("ij,ij->i", forces, track.normals) for forces, _ in passes])
+        forces, limited = passes[0]
+        clamped = clamped_ticks(simulation, forces)
+        slope = slope_of_passes(normal_forces, protocol)
+        # The tool has the surface where it is pushed back, the more the deeper.
+        pressed = (np.diff(np.vstack([normal_forces, np.zeros(len(forces))]), axis=0) < 0).all(axis=0)
+        for tick in track.ticks:
+            force = float(normal_forces[0, tick])
+            if not pressed[tick]:
+                found.append(not_measured(NO_CONTACT, np.nan, force))
+            elif limited[tick] or clamped[tick]:
+                reason = STRAIN_LIMIT if limited[tick] else FORCE_LIMIT
+                found.append(not_measured(reason, np.nan, force))
+            else:
+                at = protocol.depth
+                found.append(Measured(force, float(slope[tick]), force / at, "", at, force))
+        depth = np.full(len(forces), protocol.depth)
+        time = (track.lead + np.arange(len(forces))) / rate
+        curves.append(PressCurve(time, depth, track.position, forces, normal_forces[0], limited | clamped))
+    return found, curves
 
 
 def strokes_on(simulation: Simulation, protocol: Protocol, on: str | None) -> tuple[Sites, list[np.ndarray]]:

@@ -1,4 +1,4 @@
-"""Building of a scene: meshes, bodies, Green's functions and modes."""
+"""Building of a scene: meshes, bodies, Green's functions and modes; and where a script presses it."""
 
 from __future__ import annotations
 
@@ -21,13 +21,12 @@ from palpate.mesh.label_process import label_summary
 from palpate.mesh.size import scale_of
 from palpate.mesh.tetrahedralize import closed_surface, read_surface, tetrahedralize_with
 from palpate.progress import progress_reporter
-from palpate.scene.default_radius import require_tool_sizes, with_radii
 from palpate.scene.dynamics import BodyMotion
-from palpate.scene.early import Expected, pressing_radii
+from palpate.scene.files import is_node_file, read_nodes
 from palpate.scene.loads import together
 from palpate.scene.mistakes import located
-from palpate.scene.node_file import is_node_file, read_nodes
 from palpate.scene.regions import MaterialTable
+from palpate.scene.sizes import Expected, pressing_radii, require_tool_sizes, with_radii
 from palpate.scene.tables import BodyTable, SceneTables, SupportsTable
 from palpate.segmentation.endings import is_segmentation
 from palpate.vectors import conjugate, rotated
@@ -36,6 +35,8 @@ if TYPE_CHECKING:
     from distributed import Client
 
 Progress = bool | Callable[[int, int], None]
+# How deep a script presses, as a part of the body's longest side: small strains.
+DEPTH = 0.03
 
 
 @dataclass(frozen=True)
@@ -160,36 +161,35 @@ def require_files(scene: SceneTables) -> None:
             tool.shape_arguments(scene.folder)
 
 
+@dataclass
 class _Builder:
     """Builds one body of a scene."""
 
-    def __init__(
-        self,
-        scene: SceneTables,
-        rank: int,
-        growing: dict[int, BackgroundPrecompute] | None = None,
-        filling: Progress = True,
-        announce: Callable[[Expected], None] | None = None,
-        dask: str | Client | None = None,
-    ):
-        self._scene, self._rank, self._growing, self._filling = scene, rank, growing, filling
-        self._announce, self._dask = announce, dask
-        self._table: BodyTable = scene.bodies[rank]
-        # The store, or the body before it is solved.
-        self._prepared: GreensFunction | Body | None = None
+    scene: SceneTables
+    rank: int
+    growing: dict[int, BackgroundPrecompute] | None = None
+    filling: Progress = True
+    announce: Callable[[Expected], None] | None = None
+    dask: str | Client | None = None
+    prepared: GreensFunction | Body | None = None  # the store, or the body before it is solved
+
+    @property
+    def table(self) -> BodyTable:
+        """Table of the body."""
+        return self.scene.bodies[self.rank]
 
     def prepare(self) -> float:
         """Read or make the body, before anything is solved; returns its longest side, m."""
-        if self._table.store is None:
-            self._prepared = body = self.body()
+        if self.table.store is None:
+            self.prepared = body = self.body()
             return float(np.ptp(body.mesh.nodes, axis=0).max())
-        with self._locating_errors_in_file(["body", self._rank, "store"]):
-            self._prepared = green = GreensFunction.load(self._scene.folder / self._table.store)
+        with self._locating_errors_in_file(["body", self.rank, "store"]):
+            self.prepared = green = GreensFunction.load(self.scene.folder / self.table.store)
         return float(green.extents.max())
 
     def build(self, progress: Progress, modes_progress: Progress | None) -> BuiltBody:
         """Solve the body that was prepared."""
-        table, body = self._table, self._prepared
+        table, body = self.table, self.prepared
         place = (table.title, table.position, table.orientation)
         if isinstance(body, GreensFunction):
             return BuiltBody(None, body, None, *place)
@@ -200,23 +200,23 @@ class _Builder:
             return BuiltBody(body, green, None, *place)
         with self._locating_errors(where):
             report = progress if modes_progress is None else modes_progress
-            motion = dynamics.build(body, self._scene.device.max_stiffness, report)
+            motion = dynamics.build(body, self.scene.device.max_stiffness, report)
         return BuiltBody(body, green, motion, *place)
 
     def _green(self, body: Body, progress: Progress) -> GreensFunction:
         area, where = self._table_of_body("touch")
         with self._locating_errors(where):
-            asked = {"precision": self._table.precision, **area.areas(self._file_mesh)}
-            if self._announce is not None:
+            asked = {"precision": self.table.precision, **area.areas(self._file_mesh)}
+            if self.announce is not None:
                 moves = self._table_of_body("dynamics")[0] is not None
-                radii = () if moves else pressing_radii(self._scene, body)
-                self._announce(Expected.of(body, **asked, radii=radii))
-            if self._dask is not None:
+                radii = () if moves else pressing_radii(self.scene, body)
+                self.announce(Expected.of(body, **asked, radii=radii))
+            if self.dask is not None:
                 # A cluster computes all at once.
-                return precompute(body, **{**asked, "first": None}, progress=progress, dask=self._dask)
-            if self._growing is None or area.first is None:
+                return precompute(body, **{**asked, "first": None}, progress=progress, dask=self.dask)
+            if self.growing is None or area.first is None:
                 return precompute(body, **asked, progress=progress)
-            background = self._growing[self._rank] = BackgroundPrecompute(body, **asked)
+            background = self.growing[self.rank] = BackgroundPrecompute(body, **asked)
             with progress_reporter("precomputing what is touched first", progress) as report:
                 return background.wait(report)
 
@@ -225,8 +225,8 @@ class _Builder:
         base: MaterialTable = self._table_of_body("material")[0]
         regions, where = self._table_of_body("region")
         tables = [([*where, rank], region) for rank, region in enumerate(regions)]
-        segments = enumerate(self._table.segment)
-        tables += [(["body", self._rank, "segment", rank], segment) for rank, segment in segments]
+        segments = enumerate(self.table.segment)
+        tables += [(["body", self.rank, "segment", rank], segment) for rank, segment in segments]
         for place, table in tables:
             with self._locating_errors(place):
                 table.material(base)
@@ -237,16 +237,16 @@ class _Builder:
         Returns the longest side of the body, m; that of a segmentation is infinite: it is not known yet.
         """
         self._require_materials()
-        table = self._table
+        table = self.table
         if not table.fills_a_surface:
             return self.prepare()
-        with self._locating_errors_in_file(["body", self._rank, "mesh"]):
+        with self._locating_errors_in_file(["body", self.rank, "mesh"]):
             if is_segmentation(str(table.mesh)):
                 wanted = [segment.name for segment in table.segment]
-                label_summary(self._scene.folder / str(table.mesh), table.unit, wanted)
+                label_summary(self.scene.folder / str(table.mesh), table.unit, wanted)
                 return math.inf
             read = closed_surface if table.mesher == "netgen" else read_surface
-            surface = read(self._scene.folder / str(table.mesh))
+            surface = read(self.scene.folder / str(table.mesh))
             vertices = surface.vertices * scale_of(str(table.mesh), surface.vertices, table.unit)
         supports, where = self._table_of_body("supports")
         with self._locating_errors_in_file(where):
@@ -255,16 +255,16 @@ class _Builder:
 
     def _table_of_body(self, key: str) -> tuple[Any, list[str | int]]:
         """Table of the body, or that of the whole scene; and its place in the file."""
-        own = getattr(self._table, key)
+        own = getattr(self.table, key)
         if own is not None:
-            return own, ["body", self._rank, key]
-        return getattr(self._scene, key), [key]
+            return own, ["body", self.rank, key]
+        return getattr(self.scene, key), [key]
 
     def body(self, mesh: TetMesh | None = None) -> Body:
-        table, mesh = self._table, self.mesh() if mesh is None else mesh
+        table, mesh = self.table, self.mesh() if mesh is None else mesh
         if table.element == "linear" and mesh.is_quadratic:
             source = table.mesh or table.title
-            with self._locating_errors_in_file(["body", self._rank, "element"]):
+            with self._locating_errors_in_file(["body", self.rank, "element"]):
                 raise SceneError(f"{source} holds 10-node tetrahedra: leave out body.element, or give 'quadratic'")
         if table.adds_middles:
             mesh = mesh.to_quadratic()
@@ -291,7 +291,7 @@ class _Builder:
         loads, where = self._table_of_body("loads")
         with self._locating_errors_in_file(self._table_of_body("supports")[1]):
             fixed = self._fixed(mesh)
-        with self._locating_errors_in_file(["body", self._rank]):
+        with self._locating_errors_in_file(["body", self.rank]):
             body = Body(mesh, material=materials, fixed=fixed, loads=together(loads))
         for rank, load in enumerate(loads):
             with self._locating_errors([*where, rank]):
@@ -299,41 +299,41 @@ class _Builder:
         return body
 
     def _locating_errors(self, place: Sequence[str | int]) -> contextlib.AbstractContextManager[None]:
-        return locating_errors(self._scene, place)
+        return locating_errors(self.scene, place)
 
     def _locating_errors_in_file(self, place: Sequence[str | int]) -> contextlib.AbstractContextManager[None]:
         """Do the same where the scene is a file: what a program has given needs no line."""
-        return locating_errors(self._scene, place, None) if self._scene.source[1] else contextlib.nullcontext()
+        return locating_errors(self.scene, place, None) if self.scene.source[1] else contextlib.nullcontext()
 
     def mesh(self) -> TetMesh:
         self._require_materials()
-        with self._locating_errors_in_file(["body", self._rank, "model" if self._table.model is not None else "mesh"]):
+        with self._locating_errors_in_file(["body", self.rank, "model" if self.table.model is not None else "mesh"]):
             return self._read_mesh()
 
     def _read_mesh(self) -> TetMesh:
-        table = self._table
+        table = self.table
         if table.model is not None:
             return models.load(table.model, paper=table.paper)
-        source = self._scene.folder / str(table.mesh)
+        source = self.scene.folder / str(table.mesh)
         if table.fills_a_surface:
             finer = [(ball.center, ball.radius, ball.size) for ball in table.refine]
             element, options = table.element or "quadratic", table.fill_options
             size, unit = table.max_element_size, table.unit
-            return tetrahedralize_with(element, source, size, unit, finer, options, progress=self._filling)
+            return tetrahedralize_with(element, source, size, unit, finer, options, progress=self.filling)
         return TetMesh.read(source, table.unit)
 
     def _fixed(self, mesh: TetMesh) -> Any:
         supports: SupportsTable = self._table_of_body("supports")[0]
         fixed = supports.fixed
         if is_node_file(fixed):
-            fixed = read_nodes(self._scene.folder / str(fixed))
-        if fixed is None and self._table.model is not None:
-            return models.fixed(self._table.model, mesh)
+            fixed = read_nodes(self.scene.folder / str(fixed))
+        if fixed is None and self.table.model is not None:
+            return models.fixed(self.table.model, mesh)
         if fixed is None:
-            raise SceneError(f"supports.fixed is missing: '{self._table.title}' needs nodes that are held")
+            raise SceneError(f"supports.fixed is missing: '{self.table.title}' needs nodes that are held")
         if isinstance(fixed, str):
             return _predicate_mask(fixed, mesh.nodes)
-        if self._table.adds_middles and max(fixed, default=0) < len(mesh.nodes):
+        if self.table.adds_middles and max(fixed, default=0) < len(mesh.nodes):
             mask = np.zeros(len(mesh.nodes), dtype=bool)
             mask[fixed] = True
             between = mask[mesh.tets[:, EDGES]].all(axis=2)
@@ -372,3 +372,20 @@ def _unused(name: str, names: Mapping[str, int]) -> str:
     """Return a name that is not among those given, with a number behind it where it must."""
     candidates = (name if count == 1 else f"{name} {count}" for count in itertools.count(1))
     return next(candidate for candidate in candidates if candidate not in names)
+
+
+def press_place(built: BuiltScene) -> tuple[np.ndarray, float]:
+    """Where the first tool's origin rests when it just touches from above, m, and how deep it presses, m.
+
+    Raises SceneError for a body whose whole surface is fixed.
+    """
+    body = built.bodies[0]
+    green, nodes = body.green, body.points_to_scene(body.green.surface_positions)
+    free = np.flatnonzero(~np.isin(green.surface_nodes, green.fixed_nodes))
+    if len(free) == 0:
+        raise SceneError("the whole surface is fixed: nothing can be pressed")
+    size = float(np.ptp(nodes, axis=0).max())
+    highest = free[nodes[free, 2] > nodes[free, 2].max() - 0.01 * size]
+    middle = nodes[:, :2].mean(axis=0)
+    top = nodes[highest[np.argmin(np.linalg.norm(nodes[highest, :2] - middle, axis=1))]]
+    return top + [0, 0, built.scene.tools[0].reach], DEPTH * size

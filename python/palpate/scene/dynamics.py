@@ -29,7 +29,7 @@ _COUNT = one_of("how many, such as 200, or 'all'", lambda v: v is None or v == "
 
 
 class StrikeTable(Table):
-    """A strike on the surface point closest to a point; ``impulse`` is in N s, ``duration`` 0 is a single time step."""
+    """A strike on the surface point closest to a point."""
 
     point: Point
     """Point near the struck place of the surface."""
@@ -42,10 +42,7 @@ class StrikeTable(Table):
 class DynamicsTable(Table):
     """Motion by modes: Newmark's scheme, or the exact step of each mode under forces held within it.
 
-    ``delta`` above 1/2 damps what is too fast for the time step, of exact modes in contact only: it is the weight of
-    a step's new force. ``alpha`` is ``(delta + 1/2)^2 / 4`` unless given; exact modes have none.
-    ``damping_ratios`` are those of the first and the tenth mode; or ``rayleigh`` gives the factors
-    of mass and stiffness. ``strike`` is the one that the viewer gives when its page opens.
+    ``delta`` damps exact modes in contact only: it is the weight of a step's new force.
     """
 
     scheme: Literal["newmark", "exact"] = "newmark"

@@ -7,16 +7,11 @@ from collections.abc import Sequence
 from pydantic import model_validator
 
 from palpate.body import Body, Loads, gravity_error, parse
-from palpate.errors import BodyError
-from palpate.scene.table import Acceleration, ForceVector, SignedPressure, Table
+from palpate.scene.table import Acceleration, ForceVector, SignedPressure, Table, explained
 
 
 class LoadTable(Table):
-    """One load: gravity (m/s^2), a pressure on a part of the surface, or a force.
-
-    ``on`` is a predicate over x, y, z that names the part of the surface; a force is spread evenly over it, or acts in
-    full on each of ``nodes``.
-    """
+    """One load: gravity, a pressure on a part of the surface, or a force, which acts in full on each of ``nodes``."""
 
     gravity: Acceleration | None = None
     """Acceleration of the whole body, m/s^2."""
@@ -45,10 +40,8 @@ class LoadTable(Table):
                 "a force is spread over a part of the surface, on = '...', or acts on each of nodes = [...]"
             )
         if self.on is not None:
-            try:
+            with explained():
                 parse(self.on)
-            except BodyError as error:
-                raise ValueError(str(error)) from None
         return self
 
     def check(self, body: Body) -> None:

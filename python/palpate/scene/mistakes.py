@@ -10,7 +10,7 @@ from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from palpate.units import brief_repr
+from palpate.units import brief_repr, count_text
 
 # What pydantic adds to the place of a mistake in a value that may be of several kinds.
 UNION_MEMBERS = {"str", "int", "list[int]", "bool", "[place]", "[text]", "[nodes]"}
@@ -24,9 +24,6 @@ WORDS = {
     "string": "text in quotes",
     "tuple": "a list of numbers",
 }
-
-# Keys of earlier versions, and what stands for them.
-GONE = {"repair": "leave it out, for a surface that is open or crosses itself is wrapped without it (mesher = 'wrap')"}
 
 Place = Sequence[str | int]
 # A key, bare or in quotes, or several with dots between them.
@@ -51,8 +48,6 @@ def explain(path: Path, text: str, error: ValidationError, model: type[BaseModel
     where = ".".join(keys)
     at = located(path, text, place)
     if first["type"] == "extra_forbidden":
-        if keys[-1] in GONE:
-            return f"{at}: unknown key '{where}': {GONE[keys[-1]]}"
         known = _known_keys(model, keys[:-1])
         near = difflib.get_close_matches(keys[-1], known, 1)
         hint = f"did you mean '{near[0]}'?" if near else f"known are {', '.join(known)}"
@@ -79,15 +74,11 @@ def _expected(mistake: Mapping[str, Any], key: str) -> str:
     if kind in ("model_type", "model_attributes_type", "dict_type"):
         return f"must be a table: write [{key}] on a line of its own, and its keys below it"
     if kind == "too_short":
-        return f"needs at least {context['min_length']} {_entries(context['min_length'])}"
+        return f"needs at least {count_text(context['min_length'], 'entry', 'entries')}"
     if kind == "too_long":
-        return f"takes at most {context['max_length']} {_entries(context['max_length'])}"
+        return f"takes at most {count_text(context['max_length'], 'entry', 'entries')}"
     expectation = mistake["msg"].removeprefix("Input should be ").removeprefix("a valid ").split(", unable")[0]
     return f"must be {WORDS.get(expectation, expectation)}"
-
-
-def _entries(count: int) -> str:
-    return "entry" if count == 1 else "entries"
 
 
 def _value_text(value: Any) -> str:

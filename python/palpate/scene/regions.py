@@ -1,16 +1,27 @@
-"""``[[region]]``: parts of the body with a material of their own."""
+"""Parts of the body: ``[[region]]`` has a material of its own, ``[touch]`` may be touched, or is computed first."""
 
 from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import Discriminator, Tag, field_validator, model_validator
 
-from palpate.body import Material
-from palpate.errors import BodyError, MeshError
+from palpate.body import Material, SurfaceRegion, parse
+from palpate.errors import MeshError
 from palpate.mesh import TetMesh, shapes
-from palpate.scene.table import Density, Direction, Length, Point, PoissonsRatio, Pressure, Table, is_whole, one_of
+from palpate.scene.table import (
+    Density,
+    Direction,
+    Length,
+    Point,
+    PoissonsRatio,
+    Pressure,
+    Table,
+    explained,
+    is_whole,
+    one_of,
+)
 
 # The solid of each shape, and the keys that place it.
 SHAPES = {
@@ -58,10 +69,8 @@ class MaterialTable(Table):
 
     @model_validator(mode="after")
     def _one_material(self) -> MaterialTable:
-        try:
+        with explained():
             self.material()
-        except BodyError as error:
-            raise ValueError(str(error)) from None
         return self
 
     def material(self) -> Material:
@@ -118,10 +127,8 @@ class PlaceTable(Table):
     def solid(self) -> shapes.Shape:
         """Solid of a shape."""
         kind, keys = SHAPES[str(self.shape)]
-        try:
+        with explained():
             return kind(*(getattr(self, key) for key in keys))
-        except MeshError as error:
-            raise ValueError(str(error)) from None
 
     def elements(self, mesh: TetMesh) -> np.ndarray:
         """Mask of the elements (m,) of this region; MeshError if there are none."""
@@ -196,3 +203,64 @@ def _material(given: dict[str, Any]) -> Material:
     if given["law"] in ("linear", "neo-hookean"):
         given = {"youngs_modulus": DEFAULT_MODULUS} | given
     return Material(**given)
+
+
+def _kind(value: Any) -> str:
+    # Names that no key of a table has: they are left out of the place of a mistake.
+    return "[place]" if isinstance(value, (dict, PlaceTable)) else "[text]" if isinstance(value, str) else "[nodes]"
+
+
+def _is_nodes(value: Any) -> bool:
+    return isinstance(value, (list, tuple)) and bool(value) and all(map(is_whole, value))
+
+
+_Named = Annotated[
+    Annotated[str, Tag("[text]")] | Annotated[list[int], Tag("[nodes]")] | Annotated[PlaceTable, Tag("[place]")],
+    Discriminator(_kind),
+]
+_Area = Annotated[
+    _Named,
+    one_of(
+        "a predicate, such as 'z > 3cm', the name of a region of the mesh file, a list of node numbers, or a table of "
+        "a shape, such as { shape = 'sphere', center = ['0mm', '0mm', '40mm'], radius = '2cm' }",
+        lambda v: isinstance(v, (str, dict, PlaceTable)) or _is_nodes(v),
+    ),
+]
+
+
+class TouchTable(Table):
+    """Where the body may be touched, and what of it is computed first: the rest follows beside the force loop."""
+
+    region: _Area | None = None
+    """Part of the surface that may be touched: a predicate, the name of a region of the mesh file, node numbers, or
+    a shape. Default: all of it."""
+    first: _Area | None = None
+    """Part of the region that is computed first. `palpate run` opens when it is ready."""
+
+    @field_validator("region", "first")
+    @classmethod
+    def _readable(cls, area: Any) -> Any:
+        # A word alone is the name of a region, of which only the mesh file knows.
+        if isinstance(area, str) and any(sign in area for sign in "<>="):
+            with explained():
+                parse(area)
+        return area
+
+    def areas(self, mesh: TetMesh) -> dict[str, SurfaceRegion | None]:
+        """Arguments ``touch`` and ``first`` of :func:`palpate.precompute`; ``mesh`` has the regions of the file.
+
+        Raises MeshError for a region that the file does not have.
+        """
+        return {"touch": _area(self.region, mesh), "first": _area(self.first, mesh)}
+
+
+def _area(named: Any, mesh: TetMesh) -> SurfaceRegion | None:
+    if isinstance(named, str) and named in mesh.region_names:
+        named = PlaceTable(mesh_region=named)
+    if not isinstance(named, PlaceTable):
+        return named
+    if named.shape is not None:
+        return named.solid()
+    mask = np.zeros(len(mesh.nodes), dtype=bool)
+    mask[mesh.tets[named.elements(mesh)]] = True
+    return mask

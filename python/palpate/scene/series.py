@@ -79,9 +79,7 @@ def _computed(
 
 
 def _with(
-    built: BuiltScene,
-    radii: Callable[[BuiltBody], list[float]],
-    find: Callable[[SeriesJob], _native.Series | None],
+    built: BuiltScene, radii: Callable[[BuiltBody], list[float]], find: Callable[[SeriesJob], _native.Series | None]
 ) -> BuiltScene:
     def of_body(body: BuiltBody) -> BuiltBody:
         return replace(body, series=_found(body, radii(body), find))

@@ -2,24 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import contextlib
+from collections.abc import Callable, Iterator
 from typing import Annotated, Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+import numpy as np
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
 from palpate import units
 from palpate.errors import Error
 from palpate.units import brief_repr
 
 
+@contextlib.contextmanager
+def explained() -> Iterator[None]:
+    """Turn an Error into the ValueError that pydantic takes for a mistake in the table."""
+    try:
+        yield
+    except Error as error:
+        raise ValueError(str(error)) from None
+
+
 def _quantity(read: Callable[[Any], float]) -> BeforeValidator:
     def convert(value: Any) -> float:
-        try:
+        with explained():
             return read(value)
-        except Error as error:
-            raise ValueError(str(error)) from None
 
     return BeforeValidator(convert)
+
+
+def _of_length_one(given: tuple[float, ...]) -> tuple[float, ...]:
+    if abs(np.linalg.norm(given) - 1.0) > 1e-6:
+        raise ValueError(f"must be a unit quaternion w x y z, got {list(given)}")
+    return given
 
 
 Length = Annotated[float, _quantity(units.length), Field(gt=0, allow_inf_nan=False)]
@@ -37,6 +52,7 @@ _Acceleration = Annotated[float, _quantity(units.acceleration), Field(allow_inf_
 Share = Annotated[float, _quantity(units.share), Field(ge=0, lt=1)]
 Number = Annotated[float, Field(allow_inf_nan=False)]
 
+Orientation = Annotated[tuple[Number, Number, Number, Number], AfterValidator(_of_length_one)]
 Point = tuple[Coordinate, Coordinate, Coordinate]
 Direction = tuple[Number, Number, Number]
 Acceleration = tuple[_Acceleration, _Acceleration, _Acceleration]

@@ -1,28 +1,38 @@
-"""Tables of the scene file: bodies, supports, tools, the device's limits, the view."""
+"""Tables of the scene file: bodies, supports, tools, which device moves each of them, the view."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import numpy as np
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from palpate import models
 from palpate.body import Material, parse
-from palpate.errors import BodyError, UnitError
 from palpate.fields import STRAIN_LIMIT
 from palpate.mesh import TetMesh
 from palpate.mesh.fill_job import Element, FillOptions, Mesher
 from palpate.mesh.surface_file import SURFACE_ENDINGS
-from palpate.scene.devices import DeviceTable, check_tables, device_ranks
+from palpate.scene.devices import KINDS, LOOP_KEYS, DeviceTable
 from palpate.scene.dynamics import DynamicsTable
+from palpate.scene.files import is_node_file
 from palpate.scene.loads import LoadTable
-from palpate.scene.node_file import is_node_file
-from palpate.scene.regions import MaterialTable, RegionTable, SegmentTable
-from palpate.scene.table import Length, Number, Point, Pressure, Radius, Share, Table, is_whole, one_of
+from palpate.scene.regions import MaterialTable, RegionTable, SegmentTable, TouchTable
+from palpate.scene.table import (
+    Length,
+    Orientation,
+    Point,
+    Pressure,
+    Radius,
+    Share,
+    Table,
+    TableError,
+    explained,
+    is_whole,
+    one_of,
+)
 from palpate.scene.tool_shape import ShapeTable
-from palpate.scene.touch import TouchTable
 from palpate.segmentation.endings import SEGMENTATION_ENDINGS, is_segmentation
 from palpate.units import length_scale
 
@@ -30,8 +40,6 @@ from palpate.units import length_scale
 MOST_BODIES, MOST_TOOLS = 4, 4
 # Rubber on dry glass comes to about 2; beyond this a coefficient is a slip of the pen.
 MOST_FRICTION = 10.0
-
-Quaternion = tuple[Number, Number, Number, Number]
 
 
 _NODES = one_of(
@@ -64,25 +72,18 @@ class SupportsTable(Table):
     @classmethod
     def _readable(cls, fixed: Any) -> Any:
         if isinstance(fixed, str) and not is_node_file(fixed):
-            try:
+            with explained():
                 parse(fixed)
-            except BodyError as error:
-                raise ValueError(str(error)) from None
         return fixed
 
 
 class BodyTable(Table):
     """A solid, one of: a mesh file (volume, surface or segmentation to be filled), a built-in model, a store.
 
-    Paths are relative to the scene file. ``paper`` takes the model in the size of the paper. A surface is
-    filled with 10-node tetrahedra unless ``element = "linear"``. Volume meshes and models are taken as they are, unless
-    ``element = "quadratic"`` gives 4-node tetrahedra the middles of their edges as nodes. Supports listed by node then
-    fix the middles between them. ``mesher``, ``part`` and ``max_volume_loss`` are those of
-    :func:`palpate.tetrahedralize`. ``segment`` names parts of a label map, which become regions with their names.
-
-    ``position`` (m) and ``orientation`` (unit quaternion w x y z) place the body's own frame in the scene; predicates
-    and shapes speak of the body's own frame. ``material``, ``supports``, ``touch``, ``region``, ``loads`` and
-    ``dynamics`` of the body come before those of the whole scene.
+    Paths are relative to the scene file. ``element = "quadratic"`` gives 4-node tetrahedra of volume meshes and models
+    the middles of their edges as nodes. Supports listed by node then fix the middles between them. ``mesher``, ``part``
+    and ``max_volume_loss`` are those of :func:`palpate.tetrahedralize`. ``segment`` names parts of a label map, which
+    become regions with their names. Predicates and shapes speak of the body's own frame.
     """
 
     name: str | None = None
@@ -119,7 +120,7 @@ class BodyTable(Table):
     """Numbers of the store: `f16`, `f32` or `f64`. Default: the smallest that answers touches to 0.03 %."""
     position: Point = (0.0, 0.0, 0.0)
     """Origin of the body's own frame in the scene."""
-    orientation: Quaternion = (1.0, 0.0, 0.0, 0.0)
+    orientation: Orientation = (1.0, 0.0, 0.0, 0.0)
     """Rotation of the body's own frame in the scene: a unit quaternion w x y z."""
     supports: SupportsTable | None = None
     """Supports of this body, in place of those of the scene."""
@@ -143,12 +144,8 @@ class BodyTable(Table):
         if self.segment and not is_segmentation(self.mesh or ""):
             raise ValueError(f"segment is for a mesh that is a label map ({', '.join(SEGMENTATION_ENDINGS)})")
         if self.unit is not None:
-            try:
+            with explained():
                 length_scale(self.unit)
-            except UnitError as error:
-                raise ValueError(str(error)) from None
-        if abs(np.linalg.norm(self.orientation) - 1.0) > 1e-6:
-            raise ValueError(f"orientation must be a unit quaternion w x y z, got {list(self.orientation)}")
         return self
 
     @property
@@ -182,13 +179,9 @@ class BodyTable(Table):
 class ToolTable(ShapeTable):
     """A tool: what it looks like, how it touches, and what it rubs with.
 
-    ``contact = "local"`` is contact with a half-space in series with the finite elements: it slides with Coulomb's
-    ``friction``, and ``pad_youngs_modulus`` makes a finger's pad of a rigid tool. ``"patch"`` sticks with a disc of
-    ``contact_radius`` to what it first touched. ``"node"`` takes the closest node, as the paper does, whose stiffness
-    goes to zero with the size of the elements. A tool that grabs holds on by the disc, whatever its law. A tool that
-    names a ``contact_radius`` and no law is a patch, because only patches have one. A radius that is not given follows
-    the body.
-    ``device`` is the name of a ``[[device]]`` table, or a kind of device.
+    ``contact = "local"`` is contact with a half-space in series with the finite elements. ``"patch"`` sticks to what it
+    first touched. Under ``"node"`` the stiffness goes to zero with the size of the elements. A tool that grabs holds on
+    by the disc of ``contact_radius``, whatever its law.
     """
 
     contact: Literal["local", "patch", "node"] = "local"
@@ -217,11 +210,67 @@ class ToolTable(ShapeTable):
         return self
 
 
+def device_ranks(tools: Sequence[ToolTable], tables: Sequence[DeviceTable]) -> list[int | None]:
+    """Rank of the table of each tool's device; None for a device without one.
+
+    A tool takes the table that it names, or the first of the kind that it names which no other tool has. A tool that
+    names none takes the table of its own rank, unless that has a name or another tool has it. Raises TableError for a
+    name that is neither of a table nor of a kind, or a table of two tools.
+    """
+    names = [table.name for table in tables]
+    taken: dict[int, int] = {}
+    chosen: list[int | None] = [None] * len(tools)
+
+    def take(tool: int, rank: int) -> None:
+        chosen[tool] = rank
+        taken[rank] = tool
+
+    for tool, asked in enumerate(tool.device for tool in tools):
+        if asked in names and asked is not None:
+            rank = names.index(asked)
+            if rank in taken:
+                raise TableError(
+                    f"tools {taken[rank]} and {tool} both have the device '{asked}'", ("tool", tool, "device")
+                )
+            take(tool, rank)
+        elif asked is not None and asked not in KINDS:
+            known = [name for name in names if name] + list(KINDS)
+            raise TableError(f"there is no device '{asked}'; there are {', '.join(known)}", ("tool", tool, "device"))
+    for tool, asked in enumerate(tool.device for tool in tools):
+        if chosen[tool] is None and asked is not None:
+            fitting = (r for r, table in enumerate(tables) if table.kind == asked and r not in taken)
+            rank = next(fitting, None)
+            if rank is not None:
+                take(tool, rank)
+    for tool, asked in enumerate(tool.device for tool in tools):
+        if (
+            asked is None
+            and tool < len(tables)
+            and tool not in taken
+            and (tables[tool].name is None or len(tools) == 1)
+        ):
+            take(tool, tool)
+    return chosen
+
+
+def check_tables(first: DeviceTable, additional: Sequence[DeviceTable]) -> None:
+    """Raise TableError for what belongs to the loop in any but the first table, and for a name of two tables."""
+    for rank, table in enumerate(additional, 1):
+        for key in LOOP_KEYS:
+            if key in table.model_fields_set:
+                raise TableError(
+                    f"{key} is of the whole loop: give it in the first table [[device]]", ("device", rank, key)
+                )
+    names = [table.name for table in (first, *additional)]
+    for rank, name in enumerate(names):
+        if name is not None and name in names[:rank]:
+            raise TableError(f"two tables have the name '{name}'", ("device", rank, "name"))
+
+
 class ViewTable(Table):
     """Where the camera stands and what it looks at, m (by default the whole body), and the strain that limits the tool.
 
     Linear elasticity is accurate up to about 10 % strain, where the page warns; finger presses go beyond.
-    ``strain_limit = 0`` takes the limit away.
     """
 
     position: tuple[float, float, float] | None = None
@@ -302,3 +351,28 @@ class SceneTables(Table):
     def folder(self) -> Path:
         """Where the paths of the scene start."""
         return Path() if self._source is None else self._source[0].parent
+
+
+def tables_of_tools(scene: SceneTables, without: int | None = None) -> list[DeviceTable]:
+    """One table a tool, in their order, that of the loop in the first; leaves one tool out."""
+    loop = {key: getattr(scene.device, key) for key in LOOP_KEYS if key in scene.device.model_fields_set}
+    tables = []
+    for tool in range(len(scene.tools)):
+        if tool == without:
+            continue
+        own = scene.device_of(tool).model_dump(exclude_unset=True, exclude={"name", *LOOP_KEYS})
+        tables.append(DeviceTable(**own, **(loop if not tables else {})))
+    return tables
+
+
+def device_change(scene: SceneTables, tool: int, kind: str) -> dict[str, Any]:
+    """Give the changes of a scene in which a tool has a device of another kind, at the place of the one it had."""
+    tables = tables_of_tools(scene)
+    settings = tables[tool].model_dump(exclude_unset=True, exclude={"id", "address", "library"})
+    tables[tool] = DeviceTable(**{**settings, "kind": kind})
+    return {"tools": without_devices(scene.tools), "device": tables[0], "additional_devices": tables[1:]}
+
+
+def without_devices(tools: Sequence[ToolTable]) -> list[ToolTable]:
+    """Tools that name no device: each takes the table of its rank."""
+    return [tool.model_copy(update={"device": None}) for tool in tools]

@@ -30,12 +30,8 @@ ShapeArguments = tuple[str, tuple[float, float, float], list[list[float]], list[
 class ShapeTable(Table):
     """Keys of a tool's shape.
 
-    ``shape`` is ``"sphere"`` (``radius``), ``"ellipsoid"`` (``semi_axes``), ``"capsule"`` (``radius``, and ``length``
-    of the cylinder between its hemispheres), or ``"punch"`` (``radius``, ``rounding`` of its rim). It may also be the
-    path of a closed
-    surface file relative to the scene file, in ``unit``. Capsule and punch lie along z of the tool, their front towards
-    -z; its origin is the middle of the front hemisphere or of the face. A radius that is not given
-    follows the body.
+    Capsule and punch lie along z of the tool, their front towards -z; its origin is the middle of the front hemisphere
+    or of the face.
     """
 
     shape: str = "sphere"

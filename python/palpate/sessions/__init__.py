@@ -3,5 +3,3 @@
 from palpate.sessions.compare import Comparison, QuantityDifference, compare
 from palpate.sessions.export import FORMATS, export
 from palpate.sessions.rerun import rerun
-
-__all__ = ["FORMATS", "Comparison", "QuantityDifference", "compare", "export", "rerun"]

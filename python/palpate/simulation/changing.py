@@ -15,13 +15,19 @@ from palpate.devices import Device
 from palpate.errors import SceneError, SimulationError
 from palpate.green import GreensFunction, precompute
 from palpate.scene import BuiltBody, BuiltScene, Scene, ToolTable
-from palpate.scene.devices import KINDS, device_change, tables_of_tools
+from palpate.scene.devices import KINDS
 from palpate.scene.mistakes import reason_of
 from palpate.scene.series import with_series_of_tools, with_stored_series
-from palpate.scene.tables import BodyTable, SceneTables
-from palpate.simulation.arguments import body_arguments, tool_arguments
-from palpate.simulation.connecting import connect_tool, require_devices, warn_if_limited
-from palpate.simulation.series_growth import SeriesGrowth
+from palpate.scene.tables import BodyTable, SceneTables, device_change, tables_of_tools, without_devices
+from palpate.simulation.adjustable import SeriesGrowth
+from palpate.simulation.native import (
+    body_arguments,
+    connect_tool,
+    needs_moduli,
+    require_devices,
+    tool_arguments,
+    warn_if_limited,
+)
 from palpate.vectors import three_numbers
 
 Given, Answer = ParamSpec("Given"), TypeVar("Answer")
@@ -79,7 +85,7 @@ class SceneEditing(SeriesGrowth):
             # Of the tools here, not of those of its own scene.
             built = with_stored_series(BuiltScene(scene, (*self.bodies, built))).bodies[-1]
         measure = self._strain_measure_of(built) if self._armed else None
-        arguments = body_arguments(built, _needs_moduli(scene))
+        arguments = body_arguments(built, needs_moduli(scene))
         self._take(scene, (*self.bodies, built), lambda: _native.add_body(self._core, arguments, measure))
         self._continue_series()
         return len(self.bodies) - 1
@@ -136,7 +142,7 @@ class SceneEditing(SeriesGrowth):
         """
         bodies = list(self.bodies)
         bodies[body] = replace(bodies[self._body(body)], green=green, is_growing=is_growing)
-        arguments = body_arguments(bodies[body], _needs_moduli(self.scene))
+        arguments = body_arguments(bodies[body], needs_moduli(self.scene))
         self._take(self.scene, tuple(bodies), lambda: _native.replace_body(self._core, body, arguments))
         self._continue_series()
 
@@ -163,7 +169,7 @@ class SceneEditing(SeriesGrowth):
         if kind not in KINDS:
             raise SceneError(f"there is no kind of device '{kind}'; there are {', '.join(KINDS)}")
         first, *additional = [*tables_of_tools(self.scene), self.scene.device.of_kind(kind)]
-        tools = [named.model_copy(update={"device": None}) for named in self.scene.tools]
+        tools = without_devices(self.scene.tools)
         scene = self.scene.model_copy(
             update={"tools": [*tools, tool], "device": first, "additional_devices": additional}
         )
@@ -195,7 +201,7 @@ class SceneEditing(SeriesGrowth):
         if len(self.scene.tools) == 1 and self._tool(tool) == 0:
             raise SceneError("a simulation needs a tool: add another one before the last is removed")
         devices = tables_of_tools(self.scene, without=self._tool(tool))
-        tools = [named.model_copy(update={"device": None}) for named in self.scene.tools]
+        tools = without_devices(self.scene.tools)
         update = {"tools": tools[:tool] + tools[tool + 1 :], "device": devices[0], "additional_devices": devices[1:]}
         scene = self.scene.model_copy(update=update)
         self._take(scene, self.bodies, lambda: _native.remove_tool(self._core, tool))
@@ -258,10 +264,6 @@ def _built(body: Body | GreensFunction | Scene | Mapping[str, Any]) -> tuple[Bui
     return built.bodies[0], built.scene.bodies[0]
 
 
-def _needs_moduli(scene: SceneTables) -> bool:
-    return any(tool.contact == "local" for tool in scene.tools)
-
-
 def _placed(
     position: Sequence[float], before: Sequence[float], orientation: Sequence[float] | None
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -271,7 +273,7 @@ def _placed(
     try:
         BodyTable(model="beam", position=place, orientation=turned)
     except ValidationError as error:
-        raise SceneError(reason_of(error)) from None
+        raise SceneError(f"a body's orientation: {reason_of(error)}") from None
     return place, turned
 
 

@@ -1,8 +1,8 @@
-"""Frames: the latest tick of a running loop, with its bodies and contacts."""
+"""Frames: the latest tick of a running loop, with its bodies and contacts, and the texts of warnings about them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +11,8 @@ import numpy as np
 from palpate.dynamics import Energy
 from palpate.equality import ComparedByValue
 from palpate.fields import DeformedSurface, Exportable, Result, ResultSource, placed, together
-from palpate.scene import BuiltBody
+from palpate.scene import BuiltBody, ToolTable
+from palpate.units import count_text
 from palpate.vectors import brief
 
 if TYPE_CHECKING:
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
 
 PERCENTILES = ("p50", "p99", "p999", "max")
 STATISTICS = ("ticks", "missed_deadlines", "missed_computing", "dropped_rows", "fault", "realtime", "refused")
+# From this thickness on, over the tool's radius, a layer on a table is as accurate as a block for the half-space of the
+# local law: docs/accuracy.md.
+THICK = 1.5
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -166,7 +170,7 @@ class Frame(ComparedByValue, Exportable):
 
     def __repr__(self) -> str:
         forces = ", ".join(brief(force) for force in self.forces)
-        contacts = f"{len(self.contacts)} contact{'' if len(self.contacts) == 1 else 's'}"
+        contacts = count_text(len(self.contacts), "contact")
         return f"Frame({self.time:.3f} s, {contacts}, forces on the devices {forces} N)"
 
     def to_meshio(self) -> meshio.Mesh:
@@ -226,3 +230,44 @@ def contact_of(record: tuple[Any, ...], bodies: Sequence[BuiltBody]) -> Contact:
     nodes, place = bodies[body].green.surface_nodes[nodes], map(np.array, own)
     numbers.append(error or None)
     return Contact(tool, body, mode, *map(np.array, vectors), *flags, *numbers, nodes, np.array(weights), *place)
+
+
+def thin_places(contacts: Sequence[Contact], tools: Sequence[ToolTable], bodies: Sequence[BuiltBody]) -> list[bool]:
+    """For each tool whether it touches a part, under the local law, that is thinner than 1.5 of its radii."""
+    thin = [False] * len(tools)
+    for contact in contacts:
+        if contact.radius > 0 and not thin[contact.tool]:
+            green, thickness = bodies[contact.body].green, THICK * _size(tools[contact.tool])
+            thin[contact.tool] = green.is_thin_at(contact._own_point, contact._own_normal, thickness)
+    return thin
+
+
+def _size(tool: ToolTable) -> float:
+    """Radius of a tool, m; of an ellipsoid the smallest semi-axis."""
+    return min(tool.semi_axes) if tool.semi_axes is not None else tool.radius or 0.0
+
+
+def error_text(error: float) -> str:
+    """Warning of the largest estimated relative error of a force."""
+    return (
+        f"the force of a contact may be off by {100 * error:.2g} % (`error` of the contacts): press less deep, or "
+        "make the elements smaller"
+    )
+
+
+def limit_text(what: str, bodies: Iterable[BuiltBody], strain_limit: float) -> str:
+    """Warning of a tool, which ``what`` names, that was held."""
+    if any(body.is_hyperelastic for body in bodies):
+        return (
+            f"{what} was held where the law of its material ends, so the force stays as it was at that depth: "
+            "press less deep"
+        )
+    return (
+        f"{what} was held at the strain limit of {100 * strain_limit:.0f} % (view.strain_limit): its "
+        f"force stays as it was at that depth; press less deep"
+    )
+
+
+def refused_text(tick: int, reason: str) -> str:
+    """Warning of a tool that was in a body without a force."""
+    return f"a tool reached a body without a force, first in tick {tick}: {reason}"

@@ -25,8 +25,7 @@ from palpate.input_file import require_replaceable
 from palpate.scene import BuiltBody, BuiltScene, Scene
 from palpate.scene.series import with_whole_series
 from palpate.scene.tables import SceneTables
-from palpate.simulation.arguments import body_arguments, tool_arguments
-from palpate.simulation.connecting import largest_force
+from palpate.simulation.native import body_arguments, core_of, largest_force, needs_moduli, tool_arguments
 
 # Format of the folder; crates/scene reads it.
 FORMAT, VERSION = "palpate-scene", 2
@@ -67,23 +66,16 @@ def describe(
     """
     built = with_whole_series(built, True)
     scene, device = built.scene, built.scene.device
-    local = any(tool.contact == "local" for tool in scene.tools)
     bodies, described = [], []
     for rank, body in enumerate(built.bodies):
         store = folder / f"body-{rank}.palpate"
         _place_store(body.green, store)
-        arguments = body_arguments(body, local)
+        arguments = body_arguments(body, needs_moduli(scene))
         described.append(_body(body, arguments, store, folder / f"body-{rank}.arrays.safetensors", inside))
         bodies.append((_native.GreenCore.load(store), *arguments[1:]))
     # Whatever is refused is refused here; and what contact needs beyond the stores is kept beside them.
     for one in (scene, *others):
-        _native.SimulationCore(
-            bodies,
-            [tool_arguments(one, rank) for rank in range(len(one.tools))],
-            (largest_force(one), device.max_slew, device.ramp),
-            one.view.strain_limit,
-            (device.rate, device.cpus, device.priority),
-        )
+        core_of(one, bodies)
     return {
         "format": FORMAT,
         "version": VERSION,

@@ -247,9 +247,7 @@ class Recording(ComparedByValue):
         (m) and ``strike_duration`` (s) are those of the latest strike.
         """
         bodies = len(json.loads(self.about["keys"]))
-        of_bodies = [row["stiffness_scale"][:bodies] for row in self._columns["settings"]]
-        rows = zip(self._columns["settings"], of_bodies, strict=True)
-        return [{**row, "stiffness_scale": scales} for row, scales in rows]
+        return [{**row, "stiffness_scale": row["stiffness_scale"][:bodies]} for row in self._columns["settings"]]
 
     @cached_property
     def _columns(self) -> dict[str, Any]:

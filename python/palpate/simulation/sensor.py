@@ -11,11 +11,11 @@ import numpy as np
 from palpate import _native, units
 from palpate.equality import ComparedByValue
 from palpate.errors import SceneError
-from palpate.scene import BuiltScene, Scene
+from palpate.scene import BuiltScene, Scene, ToolTable
+from palpate.scene.tables import SceneTables
 from palpate.simulation.script import require_unit_length
 from palpate.simulation.simulation import Simulation
-from palpate.simulation.taxels import taxel_sides
-from palpate.units import brief_repr
+from palpate.units import brief_repr, count_text
 from palpate.vectors import number_array
 
 POSE, WRENCH, CONTACT = 7, 6, 21
@@ -111,14 +111,13 @@ class Sensor:
         self._scene = simulation.scene
         sides = None
         if self._taxels is not None:
-            sides = (*self._taxels, taxel_sides(self._scene, _sides(taxel_size)))
+            sides = (*self._taxels, _taxel_sides(self._scene, _sides(taxel_size)))
         simulation._prepare_script()
         self._core = _native.SensorCore(simulation._core, self._count, bool(device_limits), sides)
         self._raw: dict[str, Any] | None = None
 
     def __repr__(self) -> str:
-        tools = len(self._scene.tools)
-        return f"Sensor({self._scene.name}, {self._count} copies, {tools} tool{'s' if tools > 1 else ''})"
+        return f"Sensor({self._scene.name}, {self._count} copies, {count_text(self.tools, 'tool')})"
 
     @property
     def count(self) -> int:
@@ -269,3 +268,24 @@ def _sides(size: Any) -> tuple[float, float] | None:
     if len(sides) != 2 or not all(np.isfinite(side) and side > 0 for side in sides):
         raise SceneError(f"taxel_size must be one or two positive lengths, got {brief_repr(size)}")
     return sides
+
+
+def _taxel_sides(scene: SceneTables, sides: tuple[float, float] | None) -> list[tuple[float, float]]:
+    """Width along x and height along y of the grid of each tool, m: those given, or as large as the tool seen along z.
+
+    Raises SceneError for a tool whose law has no pressures.
+    """
+    for rank, tool in enumerate(scene.tools):
+        if tool.contact != "local":
+            raise SceneError(
+                f"taxels need pressures, which contact = '{tool.contact}' of tool {rank} has not: give it 'local'"
+            )
+    return [sides or _width_of(tool, scene) for tool in scene.tools]
+
+
+def _width_of(tool: ToolTable, scene: SceneTables) -> tuple[float, float]:
+    kind, lengths, vertices, _ = tool.shape_arguments(scene.folder)
+    if kind == "surface":
+        width, height = 2.0 * np.abs(np.array(vertices)[:, :2]).max(axis=0)
+        return float(width), float(height)
+    return 2.0 * lengths[0], 2.0 * lengths[1 if kind == "ellipsoid" else 0]

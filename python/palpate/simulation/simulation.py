@@ -12,7 +12,6 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -26,15 +25,30 @@ from palpate.fields import StrainMeasure, SurfaceStress
 from palpate.green import GreensFunction
 from palpate.scene import BodyMotion, BuiltBody, BuiltScene, Scene
 from palpate.simulation.about import about
-from palpate.simulation.arguments import body_arguments, tool_arguments
 from palpate.simulation.changing import SceneEditing
-from palpate.simulation.connecting import assume_tables, connect, disconnect, largest_force, require_devices
-from palpate.simulation.frame import Contact, Frame, contact_of, frame_of
+from palpate.simulation.frame import (
+    Contact,
+    Frame,
+    contact_of,
+    error_text,
+    frame_of,
+    limit_text,
+    refused_text,
+    thin_places,
+)
+from palpate.simulation.native import (
+    assume_tables,
+    body_arguments,
+    connect,
+    core_of,
+    disconnect,
+    needs_moduli,
+    require_devices,
+)
 from palpate.simulation.recording import LOG_DTYPE, Recording, RecordingStatus, require_new_recording
 from palpate.simulation.scheduling import scheduled, start_loop
 from palpate.simulation.script import for_all_tools, grabs_of, orientations_of, positions_of, strike_of
-from palpate.simulation.thin import thin_places
-from palpate.simulation.warned import error_text, limit_text, refused_text
+from palpate.units import count_text
 from palpate.vectors import three_numbers
 
 # A tool is held at the limit of strain only where the pose has so much of it: one that has just landed is held until
@@ -93,14 +107,8 @@ class Simulation(SceneEditing):
     ):
         built = scheduled(scene, cpus, priority)
         self.scene, self.bodies = built.scene, built.bodies
-        device, tools = self.scene.device, self.scene.tools
-        self._core = _native.SimulationCore(
-            [body_arguments(body, any(tool.contact == "local" for tool in tools)) for body in self.bodies],
-            [tool_arguments(self.scene, rank) for rank in range(len(tools))],
-            (largest_force(self.scene), device.max_slew, device.ramp),
-            self.scene.view.strain_limit,
-            (device.rate, device.cpus, device.priority),
-        )
+        local = needs_moduli(self.scene)
+        self._core = core_of(self.scene, [body_arguments(body, local) for body in self.bodies])
         assume_tables(self._core, self.scene)
         self._given = dict(devices or {})
         require_devices(self._given)
@@ -115,8 +123,7 @@ class Simulation(SceneEditing):
         self._to_record: Path | None = None
 
     def __repr__(self) -> str:
-        count = len(self.scene.tools)
-        tools = f"{count} tool{'s' if count > 1 else ''}"
+        tools = count_text(len(self.scene.tools), "tool")
         moves = ", a body in motion" if any(body.motion for body in self.bodies) else ""
         return f"Simulation({self.scene.name}, {tools}{moves}, {'running' if self._running else 'stopped'})"
 
@@ -124,9 +131,7 @@ class Simulation(SceneEditing):
         self.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         self.stop()
 
     @property

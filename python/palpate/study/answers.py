@@ -23,9 +23,9 @@ from palpate.green import GreensFunction
 from palpate.mesh import TetMesh
 from palpate.mesh.triangles import closest_on
 from palpate.scene import mesh_of_body, unsolved_body
-from palpate.scene.default_radius import PART_OF_BODY, default_contact_radius
-from palpate.scene.node_file import is_node_file
+from palpate.scene.files import is_node_file
 from palpate.scene.regions import CONSTANTS, MaterialTable
+from palpate.scene.sizes import PART_OF_BODY, default_contact_radius
 from palpate.scene.tables import SupportsTable
 from palpate.study.cases import PressTable, StudyScene
 

@@ -17,8 +17,8 @@ from palpate.body import Body
 from palpate.errors import SimulationError
 from palpate.green import GreensFunction
 from palpate.simulation import Simulation
+from palpate.validation.verify.benchmark import green_of
 from palpate.validation.verify.contact.reference import Block, body_on_table, top_middle, top_nodes
-from palpate.validation.verify.solution import green_of
 
 KINDS = ("begin", "held", "sliding", "abrupt", "release")
 # How high a tool waits, m: it comes and leaves in a single tick.

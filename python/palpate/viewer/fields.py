@@ -1,32 +1,29 @@
-"""Scalar fields over the body as the page draws them, with ranges that do not flicker."""
+"""Scalar fields over the body as the page draws them, with ranges that do not flicker; maps of a palpation too."""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from palpate.fields import (
-    ElementStrain,
-    Interior,
-    StressRecovery,
-    SurfaceStrain,
-    SurfaceStress,
-    extreme_values,
-    largest_magnitude,
-)
+from palpate.errors import ViewerError
+from palpate.fields import ElementStrain, SurfaceStrain, SurfaceStress, extreme_values, largest_magnitude
+from palpate.input_file import require_file
+from palpate.scene import BuiltBody, BuiltScene
 from palpate.simulation import Simulation
-from palpate.viewer.surface_map import SurfaceMap
 
 # A range never spans less than this part of the body's size, as a strain, or of Young's modulus: rest is not noise
 # blown up.
 LEAST = 0.005
 # Per cent of a map's values between which its colours change; a range that is typed spans at least this part of it.
 MAP_RANGE, LEAST_SPAN = (2.0, 98.0), 1e-3
+# Nodes of a map's file and of a body are the same within this part of the body's longest side.
+SAME_PLACE = 1e-6
 # A range grows at once, so that no colour is cut off, and comes down with this time constant, s.
 DECAY = 0.8
 
@@ -65,6 +62,51 @@ PALPATED_CHANGE = Field("palpated_change", "Palpated change", "%", signed=True, 
 
 
 @dataclass(frozen=True)
+class SurfaceMap:
+    """Values at the surface nodes of a body, which a pose does not change."""
+
+    stiffness: np.ndarray  # (s,) N/m, NaN where nothing was palpated
+    change: np.ndarray | None = None  # (s,) per cent more than the plain body's; None of a map without it
+
+
+def read_map(path: Path, built: BuiltScene) -> list[SurfaceMap | None]:
+    """Read ``stiffness.vtu`` or ``detection.vtu`` for the bodies of a scene; None for one that it does not hold.
+
+    Raises ViewerError for a file that is missing, cannot be read, is no map, or one of other bodies.
+    """
+    import meshio
+
+    require_file(path, ViewerError)
+    try:
+        mesh = (meshio.vtk if path.suffix.lower() == ".vtk" else meshio.vtu).read(path)
+    except (Exception, SystemExit) as error:  # meshio raises anything, and exits on what it does not know
+        raise ViewerError(
+            f"{path}: not a map that can be read: {str(error).splitlines()[0] if str(error) else 'damaged'}"
+        ) from None
+    if "stiffness" not in mesh.point_data:
+        raise ViewerError(f"{path}: no map: it has no point data 'stiffness'; 'palpate map' writes stiffness.vtu")
+    maps = [_of_body(body, np.asarray(mesh.points), mesh.point_data) for body in built.bodies]
+    if not any(maps):
+        raise ViewerError(f"{path}: a map of another body: its points are not the nodes of this surface")
+    return maps
+
+
+def _of_body(body: BuiltBody, points: np.ndarray, data: Mapping[str, np.ndarray]) -> SurfaceMap | None:
+    from scipy.spatial import cKDTree
+
+    green = body.green
+    places = body.points_to_scene(green.surface_positions + green.free_displacements)
+    off, ranks = cKDTree(points).query(places)
+    if off.max() > SAME_PLACE * green.extents.max():
+        return None
+    stiffness = np.asarray(data["stiffness"], dtype=float)[ranks]
+    if not np.isfinite(stiffness).any():
+        return None
+    ratio = data.get("ratio")
+    return SurfaceMap(stiffness, None if ratio is None else 100 * (np.asarray(ratio, dtype=float)[ranks] - 1))
+
+
+@dataclass(frozen=True)
 class Picture:
     """A field over a pose: displacements in m and values from 0 to 255 at the surface nodes, or at all (interior).
 
@@ -83,14 +125,16 @@ class Picture:
 
 
 class Fields:
-    """Fields of one running body, whose size is in m; each pose is recovered once for all clients.
+    """Fields of one running body; each pose is recovered once for all clients.
 
     The ``surface_map`` that a palpation has left of it is shown before all else.
     """
 
-    def __init__(self, simulation: Simulation, size: float, body: int = 0, surface_map: SurfaceMap | None = None):
-        self._simulation, self._size, self._body = simulation, size, body
-        self._measure = measure = simulation.bodies[body].green.strain_measure
+    def __init__(self, simulation: Simulation, body: int = 0, surface_map: SurfaceMap | None = None):
+        self._simulation, self._body = simulation, body
+        self._green = green = simulation.bodies[body].green
+        self._size = float(green.extents.max())
+        self._measure = measure = green.strain_measure
         self._surface = measure if isinstance(measure, SurfaceStrain) else None
         self._recovery = measure.recovery if isinstance(measure, ElementStrain) else None
         self.offered = [DISPLACEMENT, SURFACE_STRAIN]
@@ -103,7 +147,6 @@ class Fields:
             self.offered = [*known, *self.offered]
         self._ranges: dict[str, tuple[float, float]] = {}
         self._pose = _Pose(np.full((1, 3), np.nan))
-        self._inside: StressRecovery | None = None
 
     def largest_strain(self, displacements: np.ndarray) -> float:
         """Largest strain of a pose (s, 3), m, as :mod:`palpate.fields.strain_measure` has it."""
@@ -140,10 +183,9 @@ class Fields:
         assert values is not None
         if not inside:
             return values
-        green = self._simulation.bodies[self._body].green
-        assert green.body is not None
-        everywhere = np.full(len(green.body.mesh.nodes), np.nan)
-        everywhere[green.surface_nodes] = values
+        assert self._green.body is not None
+        everywhere = np.full(len(self._green.body.mesh.nodes), np.nan)
+        everywhere[self._green.surface_nodes] = values
         return everywhere
 
     def _fixed_range(self, field: Field, values: np.ndarray) -> tuple[float, float]:
@@ -192,7 +234,9 @@ class Fields:
         return self._pose
 
     def _extended(self, pose: _Pose) -> np.ndarray:
-        return pose.once("extended", lambda: self._interior.extend(pose.displacements))
+        assert self._recovery is not None
+        interior = self._recovery.interior
+        return pose.once("extended", lambda: interior.extend(pose.displacements))
 
     def _stress(self, pose: _Pose) -> SurfaceStress:
         assert self._recovery is not None
@@ -200,17 +244,8 @@ class Fields:
         return pose.once("surface", lambda: recover(self._extended(pose)))
 
     def _stress_inside(self, pose: _Pose) -> SurfaceStress:
-        if self._inside is None:  # most people never cut
-            body = self._simulation.bodies[self._body].body
-            assert body is not None
-            self._inside = StressRecovery(body, np.arange(len(body.mesh.nodes)), self._interior)
-        recover = self._inside.recover_inside
+        recover = self._green.stress_everywhere.recover_inside
         return pose.once("inside", lambda: recover(self._extended(pose)))
-
-    @property
-    def _interior(self) -> Interior:
-        assert self._recovery is not None
-        return self._recovery.interior
 
 
 class _Pose:

@@ -43,15 +43,16 @@ HISTORY_COLUMNS = 8
 
 
 class MovingBody:
-    """The moving side of a session: one body of its running loop, whose size is in m."""
+    """The moving side of a session: one body of its running loop."""
 
-    def __init__(self, simulation: Simulation, size: float, index: int = 0):
+    def __init__(self, simulation: Simulation, index: int = 0):
         built, scene = simulation.bodies[index], simulation.scene
         dynamics = scene.bodies[index].dynamics or scene.dynamics
         assert built.motion is not None and built.body is not None and dynamics is not None
         self.index = index
-        self._simulation, self._size, self._built = simulation, size, built
+        self._simulation, self._built = simulation, built
         self._green, self._motion = built.green, built.motion
+        self._size = float(built.green.extents.max())
         self._first_strike = dynamics.strike
         self._patch_radius = scene.tools[0].contact_radius
         self._duration = STRIKE_PERIODS / float(built.motion.basis.frequencies[0])

@@ -117,7 +117,7 @@ def _body(session: Session, rank: int) -> dict[str, Any]:
     built = session.built.bodies[rank]
     _, nodes_per_face = built.green._core.surface_faces
     return {
-        "size": session._extent(rank),
+        "size": float(built.green.extents.max()),
         "nodes_per_face": nodes_per_face,
         "position": list(built.position),
         "orientation": list(built.orientation),

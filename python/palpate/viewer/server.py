@@ -22,16 +22,13 @@ from palpate.errors import Error, ViewerError
 from palpate.green import BackgroundPrecompute
 from palpate.scene import BuiltScene, Scene
 from palpate.viewer import messages
-from palpate.viewer.addresses import port_in_use, reachable
-from palpate.viewer.client import Client
-from palpate.viewer.pages import load_pages, respond
+from palpate.viewer.fields import SurfaceMap
+from palpate.viewer.pages import load_pages, port_in_use, reachable, respond
 from palpate.viewer.session import Session, choices
-from palpate.viewer.session_host import SessionHost
-from palpate.viewer.setting_up import SettingUp
+from palpate.viewer.session_host import Client, SessionHost
+from palpate.viewer.setting_up import MAX_PART, SettingUp
 from palpate.viewer.setup_session import SetupSession
 from palpate.viewer.status import LOG, error_message
-from palpate.viewer.surface_map import SurfaceMap
-from palpate.viewer.upload import MAX_PART
 
 VERSION = version("palpate")
 DEFAULT_PORT = 8642
@@ -191,7 +188,7 @@ class ViewerServer(SessionHost):
             await server.wait_closed()
 
     def _close_session(self) -> dict[str, Any] | None:
-        self._worker.close()
+        self._worker.shutdown()
         self._setting_up.close()
         self._computing.close()
         ended = self._session.recorder.stop()

@@ -18,13 +18,11 @@ from palpate.green import BackgroundPrecompute, GreensFunction
 from palpate.scene import BuiltScene
 from palpate.scene.tables import ToolTable
 from palpate.simulation import Contact, Frame, Simulation
-from palpate.viewer.fields import ClientView, Fields
-from palpate.viewer.log_rows import RecentRows, downsampled
+from palpate.viewer.fields import ClientView, Fields, SurfaceMap
 from palpate.viewer.messages import encode, flag, index, number, numbered, quaternion, vector, word
 from palpate.viewer.motion import HISTORY_COLUMNS, MovingBody, history
-from palpate.viewer.recorder import SessionRecorder
+from palpate.viewer.recorder import RecentRows, SessionRecorder, downsampled
 from palpate.viewer.shown_body import ShownBody, title_of
-from palpate.viewer.surface_map import SurfaceMap, maps_per_body
 from palpate.viewer.tool_shapes import kind_of, outline, shape_choices, with_shape
 
 # The contact radius slider ends at this part of the body's longest side.
@@ -73,7 +71,7 @@ class Session:
         self.own_tools = scene.tools if own_tools is None else own_tools
         self.simulation = Simulation(built) if simulation is None else simulation
         self.recorder = SessionRecorder(self.simulation, folder)
-        self.maps = maps_per_body(maps, len(built.bodies))
+        self.maps = [None] * len(built.bodies) if maps is None else maps
         # What is computed of the bodies beside the loop, by their rank, once this session is shown.
         self.growing: Mapping[int, BackgroundPrecompute] = {}
         # Files of shapes may be gone when another page opens.
@@ -88,21 +86,17 @@ class Session:
         largest = self.simulation.largest_contact_radius(LARGEST_RADIUS * self.size)
         self._max_radii = [max(largest, tool.contact_radius) for tool in scene.tools]
         moving = next((body for body, one in enumerate(built.bodies) if one.motion is not None), None)
-        self._moving = None if moving is None else MovingBody(self.simulation, self._extent(moving), moving)
+        self._moving = None if moving is None else MovingBody(self.simulation, moving)
         self._log, self._history = RecentRows(3), RecentRows(HISTORY_COLUMNS)
         self._body_time = 0.0
         self._frame: Frame | None = None
         self._frame_time = 0.0
 
-    def _extent(self, body: int) -> float:
-        """Longest side of a body, m."""
-        return float(np.ptp(self.built.bodies[body].green.surface_positions, axis=0).max())
-
     def _shown(self, body: int) -> ShownBody:
         built, scene = self.built.bodies[body], self.built.scene
         material = scene.bodies[body].material or scene.material
         ratio = None if built.body is None else material.poissons_ratio
-        return ShownBody.of(built, Fields(self.simulation, self._extent(body), body, self.maps[body]), ratio)
+        return ShownBody.of(built, Fields(self.simulation, body, self.maps[body]), ratio)
 
     def start(self) -> None:
         """Start the loop."""
@@ -196,12 +190,7 @@ class Session:
 
     def copy_settings(self, other: Session) -> None:
         """Set what the sliders of another session on the same bodies have set."""
-        self._set_tools(other._of_tools())
-        for rank in range(len(self._bodies)):
-            modulus = other.simulation.youngs_modulus_of(rank)
-            if modulus is not None:
-                self.simulation.set_youngs_modulus(modulus, rank)
-        self.simulation.set_strain_limit(other.simulation.strain_limit)
+        self._apply(other.settings())
         if self._moving is not None and other._moving is not None:
             self._moving.set_time_scale(other._moving.time_scale)
 
@@ -390,8 +379,7 @@ class Session:
         return True
 
     def _set_youngs_modulus(self, youngs_modulus: float, message: Mapping[str, Any]) -> None:
-        body = index(message, "body", len(self._bodies))
-        self.simulation.set_youngs_modulus(youngs_modulus, body)
+        self.simulation.set_youngs_modulus(youngs_modulus, index(message, "body", len(self._bodies)))
 
     def _tools(self, message: Mapping[str, Any]) -> Sequence[int]:
         """Return the tool that a message names, or all of them."""
@@ -401,10 +389,15 @@ class Session:
         for tool in self._tools(message):
             self.simulation._set_of_tools(name, value, tool)
 
-    def _set_tools(self, values: Mapping[str, Sequence[float]]) -> None:
-        for name, of_tools in values.items():
-            for tool, value in enumerate(of_tools):
+    def _apply(self, values: Mapping[str, Any]) -> None:
+        """Set what a message of settings has for each tool and body, and the limit of strain."""
+        for name in TOOL_SETTINGS:
+            for tool, value in enumerate(values[name]):
                 self.simulation._set_of_tools(name, value, tool)
+        for body, modulus in enumerate(values["youngs_modulus"]):
+            if modulus is not None:
+                self.simulation.set_youngs_modulus(modulus, body)
+        self.simulation.set_strain_limit(values["strain_limit"])
 
     def _set_radius(self, radius: float, message: Mapping[str, Any]) -> None:
         tools = self._tools(message)
@@ -416,12 +409,7 @@ class Session:
 
     def _reset(self, _message: Mapping[str, Any]) -> bool:
         self.release()
-        defaults = self._defaults()
-        self._set_tools({name: defaults[name] for name in TOOL_SETTINGS})
-        self.simulation.set_strain_limit(defaults["strain_limit"])
-        for rank, modulus in enumerate(defaults["youngs_modulus"]):
-            if modulus is not None:
-                self.simulation.set_youngs_modulus(modulus, rank)
+        self._apply(self._defaults())
         if self._moving is not None:
             self._moving.end_mode()
         self.simulation.reset()

@@ -1,25 +1,88 @@
-"""What a server shows, and how another session takes its place while pages stay connected."""
+"""What a server shows, the pages that show it, and how another session takes its place while pages stay connected."""
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import json
+import time
 from collections.abc import Callable, Coroutine
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
+from websockets.asyncio.server import ServerConnection
+from websockets.exceptions import ConnectionClosed
+
 from palpate.errors import Error, ViewerError
-from palpate.viewer.background import CancellableTask, Worker
-from palpate.viewer.client import Client
 from palpate.viewer.computing import Computing
+from palpate.viewer.fields import ClientView
 from palpate.viewer.session import Session
 from palpate.viewer.setup_session import SetupSession
-from palpate.viewer.status import StatusReporter, error_message, status
+from palpate.viewer.status import CancellableTask, StatusReporter, error_message, status
 
+# Messages a second that a page may send.
+MAX_RATE = 1500.0
+# A page that does not take a message for this long is disconnected, s: what is sent to it would pile up.
+STALLED_AFTER = 10.0
 Shown = Session | SetupSession
 Result = TypeVar("Result")
 
 ONE_SCENE = "a recording is of one scene, and this one has another now"
 # How long the end of a server waits for a long work that was cancelled, s.
 CANCEL_PATIENCE = 5.0
+
+
+@dataclass(eq=False)
+class Client:
+    """One connected page."""
+
+    connection: ServerConnection
+    shown: Session | SetupSession | None = None
+    # The session whose frames failed, once the page has the error message.
+    refused: Session | SetupSession | None = None
+    wants: ClientView = field(default_factory=ClientView)
+    sent: int = 0
+    log_seen: tuple[int, int] = (0, 0)
+    may_send: asyncio.Event = field(default_factory=asyncio.Event)
+    last_message: float = field(default_factory=time.monotonic)
+    allowance: float = MAX_RATE
+    # Messages to be written; the future of one, if it has one, is set when it is written.
+    _outgoing: asyncio.Queue[tuple[str | bytes, asyncio.Future[None] | None]] = field(default_factory=asyncio.Queue)
+
+    def send(self, message: dict[str, Any]) -> None:
+        """Send a text message, without waiting for this page: the others would wait, too."""
+        self._outgoing.put_nowait((json.dumps(message), None))
+
+    async def send_now(self, data: bytes) -> None:
+        """Send a binary message after all that was sent before, and wait until it is written."""
+        written: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._outgoing.put_nowait((data, written))
+        await written
+
+    async def write(self) -> None:
+        """Write what is sent, until the connection ends; one that takes nothing for long is ended."""
+        with contextlib.suppress(ConnectionClosed):
+            while True:
+                data, written = await self._outgoing.get()
+                try:
+                    await asyncio.wait_for(self.connection.send(data), STALLED_AFTER)
+                except asyncio.TimeoutError:
+                    self.abort()
+                    return
+                if written is not None and not written.done():
+                    written.set_result(None)
+
+    def abort(self) -> None:
+        """End the connection without a word: its page takes none."""
+        self.connection.transport.abort()
+
+    def is_within_rate(self) -> bool:
+        """Count a message that has come; False for one too many."""
+        now = time.monotonic()
+        self.allowance = min(self.allowance + (now - self.last_message) * MAX_RATE, MAX_RATE) - 1.0
+        self.last_message = now
+        return self.allowance >= 0.0
 
 
 class SessionHost:
@@ -34,7 +97,8 @@ class SessionHost:
         self._computing = Computing(session.growing)
         self._computing.begin()
         session.start()
-        self._worker = Worker()
+        # A single thread keeps frames, settings and commands of the running simulation in order without locks.
+        self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="palpate-session")
         self._clients: list[Client] = []
         self._controller: Client | None = None
         self._building: CancellableTask | None = None
@@ -72,12 +136,12 @@ class SessionHost:
         return self._session
 
     async def call(self, work: Callable[..., Result], *arguments: Any) -> Result:
-        """Do ``work(*arguments)`` on the worker's thread."""
-        return await self._worker.call(work, *arguments)
+        """Do ``work(*arguments)`` on the worker's thread, and return its result or raise its error."""
+        return await asyncio.get_running_loop().run_in_executor(self._worker, work, *arguments)
 
     async def with_session(self, work: Callable[[Any], Result]) -> Result:
         """Do ``work(session)`` on the worker's thread, with the session that is shown when its turn comes."""
-        return await self._worker.call(lambda: work(self._session))
+        return await self.call(lambda: work(self._session))
 
     def exchange(self, session: Shown) -> None:
         """Put a session in the place of the one that runs. If it does not start, the one before runs again.

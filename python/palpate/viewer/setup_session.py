@@ -11,10 +11,9 @@ import numpy as np
 from palpate.errors import ViewerError
 from palpate.green import BackgroundPrecompute
 from palpate.mesh import TetMesh
-from palpate.viewer.drawn_surface import drawn_triangles
 from palpate.viewer.messages import encode, numbered
 from palpate.viewer.setup_body import SetupBody
-from palpate.viewer.shown_body import body_arrays, body_header, title_of
+from palpate.viewer.shown_body import body_arrays, body_header, drawn_triangles, title_of
 
 # Of a page without a body, m: what the camera's distances follow.
 EMPTY_SIZE = 0.1

@@ -13,11 +13,10 @@ from pathlib import Path
 
 from palpate.atomic import folder_beside
 from palpate.errors import SceneError, ViewerError
-from palpate.green.disk import STORED
+from palpate.green.resources import STORED
 from palpate.input_file import require_replaceable
 from palpate.scene import BuiltScene, Scene
-from palpate.viewer.gallery import PICTURES, Card, gallery_page
-from palpate.viewer.gallery_picture import gallery_picture
+from palpate.viewer.gallery import PICTURES, Card, gallery_page, gallery_picture
 from palpate.viewer.packed_page import packed_page
 from palpate.viewer.shown_body import title_of
 

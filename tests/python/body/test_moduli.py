@@ -12,7 +12,7 @@ import palpate
 from palpate import _native
 from palpate.body import problem_arrays, surface_moduli
 from palpate.scene import BuiltBody
-from palpate.simulation.arguments import body_arguments
+from palpate.simulation.native import body_arguments
 
 UNPLACED = {"materials": {"0": [5e3, 0.45, 1000.0], "1": [40e3, 0.3, 1000.0]}}
 SOFT, STIFF = palpate.Material(5e3, 0.45), palpate.Material(40e3, 0.3)

@@ -9,7 +9,7 @@ import pytest
 from command_line import refused, run
 
 import palpate
-from palpate import cache_limit
+from palpate import cache as cache_limit
 from palpate.cache import cache_directory
 
 MEGABYTE = 1_000_000

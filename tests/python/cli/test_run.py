@@ -19,7 +19,7 @@ from palpate.cli.bodies import likely_units
 from palpate.cli.run_file import RunOptions, built_from
 from palpate.models import NAMES
 from palpate.scene import Scene
-from palpate.scene.default_radius import default_contact_radius, default_radius
+from palpate.scene.sizes import default_contact_radius, default_radius
 from palpate.validation.verify import BENCHMARKS
 
 BLOCK = Path(__file__).parents[3] / "examples" / "block.obj"

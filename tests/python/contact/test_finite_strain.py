@@ -11,9 +11,9 @@ import palpate
 from palpate.body import surface_strain_terms
 from palpate.errors import SceneError
 from palpate.scene import Scene
+from palpate.validation.verify.benchmark import green_of
 from palpate.validation.verify.contact.loop import pressed, sphere
 from palpate.validation.verify.contact.reference import Block, finer_in_the_middle, top_nodes
-from palpate.validation.verify.solution import green_of
 
 RADIUS = 0.01
 DEPTHS = np.array([1.0, 2.0, 5.0, 10.0]) * 1e-3

@@ -13,9 +13,9 @@ from palpate.green.series import SeriesJob, series_beside
 from palpate.scene import BuiltScene, Scene
 from palpate.scene.series import with_series
 from palpate.simulation import Simulation
+from palpate.validation.verify.benchmark import green_of
 from palpate.validation.verify.contact.loop import UNLIMITED, sphere
 from palpate.validation.verify.contact.reference import Block, finer_in_the_middle
-from palpate.validation.verify.solution import green_of
 
 RADIUS = 0.01
 # Tetrahedra of a cuboid, by its corners 4 x + 2 y + z.

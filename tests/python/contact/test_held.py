@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from palpate.validation.verify.benchmark import green_of
 from palpate.validation.verify.contact.loop import loop_of, sphere
 from palpate.validation.verify.contact.reference import Block, body_on_table, top_nodes
-from palpate.validation.verify.solution import green_of
 
 FRICTIONAL = {"contact": "local", "friction": 0.3}
 TOOLS = {

@@ -16,10 +16,10 @@ import numpy as np
 import pytest
 
 from palpate.body import Body
-from palpate.validation.verify.contact import balance, energy, friction, measures, pressing, shapes, sliding
+from palpate.validation.verify.benchmark import green_of, quiet_body
+from palpate.validation.verify.contact import energy, measures, pressing, sliding
 from palpate.validation.verify.contact.loop import loop_of, sphere
 from palpate.validation.verify.contact.reference import body_on_table, sphere_press, top_nodes
-from palpate.validation.verify.solution import green_of, quiet_body
 
 
 def stale(forces: np.ndarray, axis: int = 0) -> np.ndarray:
@@ -55,13 +55,13 @@ def test_a_force_five_per_cent_off_is_not_that_of_the_direct_solution():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("make", [shapes.finger_pad, shapes.flat_punch])
+@pytest.mark.parametrize("make", [pressing.finger_pad, pressing.flat_punch])
 def test_a_force_five_per_cent_off_is_not_that_of_the_shape(make):
-    body, shape, depth = body_on_table(shapes.BLOCK, (10, 10, 5), quadratic=True), make(), 5e-4
-    forces = shapes.pressed(body, shape, np.linspace(1e-4, depth, 5))
-    truth = shapes.direct(shapes.BLOCK, shape, depth)
+    body, shape, depth = body_on_table(pressing.BLOCK, (10, 10, 5), quadratic=True), make(), 5e-4
+    forces = pressing.pressed_shape(body, shape, np.linspace(1e-4, depth, 5))
+    truth = pressing.direct(pressing.BLOCK, shape, depth)
     # Closer than all shapes of the table have to be.
-    tolerance = 0.75 * shapes.TOLERANCE
+    tolerance = 0.75 * pressing.TOLERANCE
     assert abs(forces[-1] / truth - 1) <= tolerance
     for wrong in (1.05 * forces, -forces, stale(forces)):
         assert abs(wrong[-1] / truth - 1) > tolerance
@@ -134,7 +134,7 @@ def test_closed_paths_see_stale_turned_and_misdirected_forces(bench, tools):
 
 @pytest.mark.slow
 def test_the_cone_and_mindlins_curve_see_wrong_friction():
-    forces, normals = friction.dragged(0.3, drags=10)
+    forces, normals = sliding.dragged(0.3, drags=10)
     assert measures.beyond_cone(forces, normals, 0.3) <= 1e-6
     assert measures.beyond_cone(forces * np.array([1.05, 1.05, 1.0]), normals, 0.3) > 1e-6
     touching = np.linalg.norm(forces, axis=1) > 0
@@ -143,24 +143,24 @@ def test_the_cone_and_mindlins_curve_see_wrong_friction():
     assert measures.attraction(-forces, normals) > 0
     assert measures.beyond_cone(forces[:, ::-1], normals, 0.3) > 1e-6
 
-    slip = friction.partial_slip(0.3)
-    assert slip.error <= friction.PARTIAL_SLIP
-    body = friction.deep_block()
-    side = quiet_body(body.mesh, friction.DEEP.material, body.mesh.nodes[:, 0] < 1e-9)
+    slip = sliding.partial_slip(0.3)
+    assert slip.error <= sliding.PARTIAL_SLIP
+    body = sliding.deep_block()
+    side = quiet_body(body.mesh, sliding.DEEP.material, body.mesh.nodes[:, 0] < 1e-9)
     wrong = {
         "times 1.05": 1.05 * slip.forces,
         "wrong sign": -slip.forces,
         "stale": np.append(0.0, slip.forces[:-1]),
-        "axes exchanged": friction.partial_slip(0.3, side).forces,
+        "axes exchanged": sliding.partial_slip(0.3, side).forces,
     }
     for name, falsified in wrong.items():
-        error = friction.PartialSlip(slip.shifts, falsified, slip.exact, slip.limit).error
-        assert error > friction.PARTIAL_SLIP, f"{name}: {error}"
+        error = sliding.PartialSlip(slip.shifts, falsified, slip.exact, slip.limit).error
+        assert error > sliding.PARTIAL_SLIP, f"{name}: {error}"
 
 
 def test_the_balance_sees_all_of_them():
-    forces, reactions, loads = balance.dragged()
-    assert balance.imbalance(forces, reactions, loads) <= 1e-9
+    forces, reactions, loads = energy.dragged()
+    assert energy.imbalance(forces, reactions, loads) <= 1e-9
     wrong = {
         "times 1.05": 1.05 * forces,
         "wrong sign": -forces,
@@ -168,4 +168,4 @@ def test_the_balance_sees_all_of_them():
         "turned along the surface": forces * np.array([-1.0, 1.0, 1.0]),
     }
     for name, falsified in wrong.items():
-        assert balance.imbalance(falsified, reactions, loads) > 1e-9, name
+        assert energy.imbalance(falsified, reactions, loads) > 1e-9, name

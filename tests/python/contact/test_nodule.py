@@ -10,7 +10,7 @@ import pytest
 
 import palpate
 from palpate.scene import BuiltScene
-from palpate.scene.touch import TouchTable
+from palpate.scene.regions import TouchTable
 from palpate.validation.verify.contact.hidden_ball import HiddenBall
 from palpate.validation.verify.contact.loop import UNLIMITED, straight
 

@@ -9,10 +9,10 @@ from conftest import box_mesh
 import palpate
 from palpate.fields import Interior
 from palpate.scene import BuiltScene
+from palpate.validation.verify.benchmark import green_of
 from palpate.validation.verify.contact import groove
 from palpate.validation.verify.contact.loop import loop_of, sphere
 from palpate.validation.verify.contact.reference import Block, body_on_table, top_nodes
-from palpate.validation.verify.solution import green_of
 
 BARE = {"device": {"max_force": 1e3, "max_slew": 1e9, "ramp": 0, "max_stiffness": 1e9}, "view": {"strain_limit": 0}}
 ELLIPSOID = {"shape": "ellipsoid", "semi_axes": (0.008, 0.006, 0.005)}

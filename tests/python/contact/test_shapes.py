@@ -13,7 +13,7 @@ from scipy.special import ellipe, ellipk
 
 import palpate
 from palpate.scene import BuiltScene
-from palpate.simulation.arguments import tool_arguments
+from palpate.simulation.native import tool_arguments
 
 SIZE = np.array([0.12, 0.12, 0.08])
 TOP = np.array([0.061, 0.059, 0.08])

@@ -11,9 +11,9 @@ import time
 import numpy as np
 import pytest
 
+from palpate.validation.verify.benchmark import green_of
 from palpate.validation.verify.contact.loop import loop_of, sphere
 from palpate.validation.verify.contact.reference import Block, body_on_table, sphere_press, top_nodes
-from palpate.validation.verify.solution import green_of
 
 RADIUS, SIDE, STEP = 8e-3, 0.06, 10e-6
 DEPTHS = np.array([0.25e-3, 0.5e-3, 1e-3, 2e-3])

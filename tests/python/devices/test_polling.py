@@ -17,7 +17,7 @@ from held_device import Held, unstarved
 
 import palpate
 from palpate.devices import SelfCheck
-from palpate.devices.polling import PollingThread
+from palpate.devices.device import PollingThread
 
 RISE = 0.4
 

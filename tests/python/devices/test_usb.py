@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from palpate.devices import usb, usb_devices
+from palpate.devices import listing, usb_devices
 
 BUS = "sys/bus/usb/devices"
 # As Linux shows a Falcon, an omega, a Touch on a serial port, and a keyboard.
@@ -46,7 +46,7 @@ def test_haptic_devices_are_known_by_their_numbers(root):
 
 
 def test_the_missing_permission_is_told_with_its_remedy(root, monkeypatch):
-    monkeypatch.setattr(usb.os, "access", lambda path, mode: False)
+    monkeypatch.setattr(listing.os, "access", lambda path, mode: False)
     falcon, omega, touch = usb_devices(root)
     assert not (falcon.allowed or touch.allowed)
     assert 'ATTR{idVendor}=="0403", ATTR{idProduct}=="cb48"' in falcon.remedy[0]

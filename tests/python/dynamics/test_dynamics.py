@@ -9,7 +9,7 @@ import scipy.sparse.linalg
 from conftest import box_mesh, skfem_mass, skfem_stiffness
 
 import palpate
-from palpate.dynamics import residual
+from palpate.dynamics import newmark
 
 SCHEMES = [(0.25, 0.5), (0.3025, 0.6), (1 / 6, 0.5), (0.0, 0.5), (0.1, 0.7)]
 
@@ -305,7 +305,7 @@ def test_a_held_press_ends_at_the_static_solution_for_any_number_of_modes(medium
 
 
 def test_truncation_without_correction_would_not(medium, monkeypatch):
-    monkeypatch.setattr(residual.Residual, "answer", lambda _self, forces: np.zeros_like(forces))
+    monkeypatch.setattr(newmark.Residual, "answer", lambda _self, forces: np.zeros_like(forces))
     node = corner(medium)
     motion = palpate.Newmark(medium, 2e-3, rayleigh=(60.0, 2e-3), modes=20)
     motion.step({node: (0.0, 0.0, -0.03)}, 4000)

@@ -145,7 +145,7 @@ def test_a_killed_child_is_reported_and_its_work_is_found_again(job, whole):
     try:
         begun.wait(60.0)
         children = subprocess.run(["pgrep", "-P", str(os.getpid())], capture_output=True, text=True).stdout.split()
-        ours = [pid for pid in map(int, children) if b"series_child" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+        ours = [pid for pid in map(int, children) if b"series" in Path(f"/proc/{pid}/cmdline").read_bytes()]
         for pid in ours:
             os.kill(pid, signal.SIGKILL)
         background.wait(60.0)

@@ -245,7 +245,7 @@ def test_regions_by_nodes_predicate_and_solid_are_the_same(body, tmp_path):
 
 
 def test_a_store_that_does_not_fit_the_disk_is_refused_with_what_would(body, tmp_path, monkeypatch):
-    monkeypatch.setattr("palpate.green.disk.free_bytes", lambda target: 2_000_000)
+    monkeypatch.setattr("palpate.green.resources.free_bytes", lambda target: 2_000_000)
     with pytest.raises(
         palpate.StoreError, match=r"are free there: a touch region of up to \d+ of the \d+ nodes fits, 'f16'"
     ):

@@ -7,7 +7,7 @@ import struct
 import numpy as np
 import pytest
 
-from palpate.openigtlink.axes import Axes
+from palpate.openigtlink.link import Axes
 from palpate.openigtlink.messages import (
     HEADER,
     MOST_BODY_BYTES,

@@ -14,7 +14,7 @@ import pytest
 import palpate
 from palpate.openigtlink import Axes, Link, LinkServer
 from palpate.openigtlink.messages import HEADER, Message, pack, string_content, transform_content
-from palpate.openigtlink.peer import PATIENCE
+from palpate.openigtlink.server import PATIENCE
 from palpate.scene import BuiltScene
 
 pyigtl = pytest.importorskip("pyigtl")
@@ -174,7 +174,7 @@ def test_unknown_messages_and_commands_change_nothing(server, simulation):
 
 
 def test_a_peer_that_takes_nothing_up_or_stops_within_a_message_is_left_behind(server, monkeypatch):
-    monkeypatch.setattr("palpate.openigtlink.peer.PATIENCE", 0.3)
+    monkeypatch.setattr("palpate.openigtlink.server.PATIENCE", 0.3)
     assert PATIENCE == 5.0
     half = pack("TRANSFORM", "Tool", transform_content(pose(0)))[:70]
     with (

@@ -13,7 +13,7 @@ from palpated import TOP, block_body, scene_of
 
 import palpate
 from palpate.palpation import runs, stiffness_map
-from palpate.palpation.partial import MARK
+from palpate.palpation.runs import MARK
 
 
 def interrupted(block, partial, after: int) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import palpate
-from palpate.scene.devices import tables_of_tools
+from palpate.scene.tables import tables_of_tools
 
 SCENE = """[body]
 model = "beam"

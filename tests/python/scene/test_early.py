@@ -10,8 +10,8 @@ import pytest
 from conftest import box_mesh
 
 import palpate
-from palpate.scene import early
-from palpate.scene.early import TOWARDS_VIEWER, Expected, seen_middle
+from palpate.scene import sizes
+from palpate.scene.sizes import TOWARDS_VIEWER, Expected, seen_middle
 
 VIEWPORT = Path(__file__).parents[3] / "viewer" / "src" / "scene" / "viewport.ts"
 SIZE = np.array([0.08, 0.05, 0.05])
@@ -29,7 +29,7 @@ def test_the_page_looks_from_where_the_first_touch_is_planned():
 
 
 def test_a_long_body_is_touched_first_where_the_page_shows_its_middle(monkeypatch):
-    monkeypatch.setattr(early, "LONG", 0.0)
+    monkeypatch.setattr(sizes, "LONG", 0.0)
     body = block("z < min + 1mm")
     (center, radius) = Expected.of(body).first
     # The line of sight through the middle of the box leaves it at the front, y = 0, above its middle.

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import palpate
-from palpate.scene.node_file import read_nodes, write_nodes
+from palpate.scene.files import read_nodes, write_nodes
 
 
 def test_numbers_come_back_ascending_and_once(tmp_path):

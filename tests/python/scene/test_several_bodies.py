@@ -159,7 +159,7 @@ def test_tools_reach_the_body_where_it_is_placed(folder):
         (
             "orientation = [0.6, 0, 0, 0.8]",
             "orientation = [0.6, 0, 0, 0.7]",
-            r"s\.toml:6: body: orientation must be a unit",
+            r"s\.toml:10: body\.orientation: must be a unit",
         ),
         (
             "orientation = [0.6, 0, 0, 0.8]",

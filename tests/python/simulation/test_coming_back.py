@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from palpate.simulation import Simulation
+from palpate.validation.verify.benchmark import green_of
 from palpate.validation.verify.contact.loop import loop_of, sphere
 from palpate.validation.verify.contact.reference import Block, body_on_table, top_nodes
-from palpate.validation.verify.solution import green_of
 
 RADIUS, DEEP = 6e-3, 12e-3
 UNFELT = 1e-3

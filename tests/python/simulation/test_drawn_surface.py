@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from palpate import Material
+from palpate.validation.verify.benchmark import green_of
 from palpate.validation.verify.contact.loop import loop_of, sphere
 from palpate.validation.verify.contact.reference import Block, body_on_table, top_nodes
-from palpate.validation.verify.solution import green_of
 
 RADIUS, LENGTH, TOP = 6e-3, 18e-3, 0.05
 # Between the nodes, which are 6.25 mm apart.

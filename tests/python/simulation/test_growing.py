@@ -3,6 +3,7 @@
 import shutil
 import threading
 import time
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -122,7 +123,7 @@ def test_the_rest_is_computed_beside_the_loop_and_goes_on_another_time(tmp_path)
     mesh = box_mesh((7, 7, 5), (SIDE, SIDE, SIDE), jitter=0.0)
     body = palpate.Body(mesh, material=palpate.Material(20e3, 0.4), fixed=mesh.nodes[:, 2] < 1e-9)
     path = tmp_path / "a.palpate"
-    with BackgroundPrecompute(body, first="x > 5cm", precision="f32", path=path) as background:
+    with closing(BackgroundPrecompute(body, first="x > 5cm", precision="f32", path=path)) as background:
         first = background.wait()
         assert len(first.touchable_nodes) > 0
         background.yield_processor()
@@ -131,7 +132,7 @@ def test_the_rest_is_computed_beside_the_loop_and_goes_on_another_time(tmp_path)
     # It may have ended before it could say so.
     is_complete = len(palpate.GreensFunction.load(path).touchable_nodes) == len(surface)
     assert path.with_name("a.palpate.partial").exists() or is_complete
-    with BackgroundPrecompute(body, first="x > 5cm", precision="f32", path=path) as background:
+    with closing(BackgroundPrecompute(body, first="x > 5cm", precision="f32", path=path)) as background:
         assert len(background.wait().touchable_nodes) >= len(first.touchable_nodes)
         until = time.monotonic() + 60
         while not background.is_complete and time.monotonic() < until:
@@ -151,7 +152,7 @@ def test_a_store_that_another_process_computes_is_waited_for_and_its_stages_are_
     theirs = surface[mesh.nodes[surface, 0] < 0.03]
     palpate.precompute(body, precision="f32", touch=theirs, path=part, progress=False)
     held = _native.StoreClaim.take(path)
-    with BackgroundPrecompute(body, first="x > 5cm", precision="f32", path=path) as background:
+    with closing(BackgroundPrecompute(body, first="x > 5cm", precision="f32", path=path)) as background:
         # What the other process has ready can be touched here too.
         appear = threading.Timer(2.0, lambda: shutil.copy(part, tmp_path / "new") and (tmp_path / "new").rename(path))
         appear.start()

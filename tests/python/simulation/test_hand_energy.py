@@ -11,9 +11,9 @@ import pytest
 
 from palpate.scene import BodyMotion
 from palpate.validation.verify.contact import energy, measures
-from palpate.validation.verify.contact.closed_paths import ClosedPaths
 from palpate.validation.verify.contact.energy import RADIUS, SLIDE, EnergyBench
 from palpate.validation.verify.contact.loop import loop_of, sphere
+from palpate.validation.verify.contact.paths import ClosedPaths
 from palpate.validation.verify.contact.reference import body_on_table
 
 PATHS, TICKS = 12, 1000

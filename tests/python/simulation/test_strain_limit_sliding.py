@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import palpate
+from palpate.validation.verify.benchmark import green_of
 from palpate.validation.verify.contact.loop import UNLIMITED, sphere, straight
 from palpate.validation.verify.contact.reference import Block, body_on_table, top_nodes
-from palpate.validation.verify.solution import green_of
 
 RADIUS, LIMIT, DEPTH = 0.008, 0.3, 0.01
 # 20 mm/s: the response to a contact comes 16 ticks after it was asked for, a third of a millimetre farther on.

@@ -14,7 +14,8 @@ from command_line import refused, run
 from benches.viewer import servo_threads
 from palpate import DeviceLimits
 from palpate.devices import FoundDevice, Listing, Obstacle
-from palpate.validation import doctor
+from palpate.validation.doctor import report as doctor
+from palpate.validation.doctor.machine import cpu_list
 from palpate.validation.ticks import LoopTimes, Times
 
 CPU, CLOCK = "sys/devices/system/cpu", "sys/devices/system/clocksource/clocksource0"
@@ -171,7 +172,7 @@ def test_the_time_that_others_took_is_read(tmp_path):
 
 @pytest.mark.parametrize(("text", "cpus"), [("0-3,6\n", (0, 1, 2, 3, 6)), ("\n", ()), ("(null)\n", ()), (None, None)])
 def test_lists_of_processors(text, cpus):
-    assert doctor.cpu_list(text) == cpus
+    assert cpu_list(text) == cpus
 
 
 def report(found: doctor.Machine, late_us=(), missed=0, tick_us=20.0) -> doctor.Report:

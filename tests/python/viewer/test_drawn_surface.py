@@ -16,11 +16,11 @@ from palpate.green import function
 from palpate.mesh import TetMesh
 from palpate.scene import BuiltScene
 from palpate.validation.verify.grids import lattice, mapped
-from palpate.viewer import drawn_surface as module
 from palpate.viewer import messages
-from palpate.viewer.drawn_surface import drawn_surface
+from palpate.viewer import shown_body as module
 from palpate.viewer.fields import ClientView
 from palpate.viewer.session import Session
+from palpate.viewer.shown_body import drawn_surface
 
 MOST = 3000
 

@@ -15,7 +15,7 @@ from websockets.asyncio.client import connect
 import palpate
 from palpate.scene import BuiltScene
 from palpate.viewer import messages
-from palpate.viewer.addresses import reachable
+from palpate.viewer.pages import reachable
 from palpate.viewer.server import BAD_TOKEN, ViewerServer
 
 

@@ -10,9 +10,8 @@ from viewer_client import frame_of
 import palpate
 from palpate.palpation import compare, stiffness_map
 from palpate.viewer import messages
-from palpate.viewer.fields import ClientView
+from palpate.viewer.fields import ClientView, read_map
 from palpate.viewer.session import Session
-from palpate.viewer.surface_map import read_map
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from viewer_client import page, serving
 
 import palpate
 from palpate.scene import BuiltScene
-from palpate.viewer.preparing import Preparation, Prepared, PreparingSession, prepare
+from palpate.viewer.live import Preparation, Prepared, PreparingSession, prepare
 
 
 def test_the_surface_is_drawn_and_stages_are_shown_before_the_body_can_be_touched(block, block_green):

@@ -21,8 +21,8 @@ import palpate
 from palpate.errors import DeviceError, MeshError, ViewerError
 from palpate.scene import BuiltScene, Scene
 from palpate.simulation import Recording, ReplayedSimulation, Simulation
-from palpate.viewer import client as clients
 from palpate.viewer import messages, setting_up
+from palpate.viewer import session_host as clients
 from palpate.viewer.replay_session import ReplaySession
 from palpate.viewer.session import Session
 from palpate.viewer.session_host import ONE_SCENE

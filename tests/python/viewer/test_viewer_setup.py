@@ -14,8 +14,8 @@ from viewer_client import page, serving, settled
 import palpate
 from palpate.body.tissues import TISSUES
 from palpate.mesh import TetMesh
-from palpate.scene.writing import scene_text
-from palpate.viewer import upload
+from palpate.scene.files import scene_text
+from palpate.viewer import setting_up
 
 # A ball of 80 mm: filled in a second.
 RADIUS_MM = 40.0
@@ -167,7 +167,7 @@ def test_uploads_are_bounded_and_only_from_the_page_in_control(ball, saves):
             assert "control" in (await watcher.receive("error"))[0]["text"]
             await watcher.socket.send(b"x" * 100)
             assert "control" in (await watcher.receive("error"))[0]["text"]
-            await client.say(type="upload", name="ball.stl", size=upload.MAX_FILE + 1)
+            await client.say(type="upload", name="ball.stl", size=setting_up.MAX_FILE + 1)
             assert "up to 200 MB" in (await client.receive("error"))[0]["text"]
             await client.socket.send(b"x")
             assert "announce" in (await client.receive("error"))[0]["text"]
@@ -250,7 +250,7 @@ def test_tetrahedra_and_numbers_of_a_saved_scene_are_exact(tmp_path):
 
 @pytest.mark.slow
 def test_a_body_that_takes_long_is_touched_before_all_of_it_is_computed(ball, saves, monkeypatch):
-    monkeypatch.setattr("palpate.scene.early.LONG", 0.0)
+    monkeypatch.setattr("palpate.scene.sizes.LONG", 0.0)
 
     async def session():
         async with empty_page(saves) as (server, client):

@@ -14,7 +14,7 @@ import palpate
 from palpate.body.tissues import TISSUES
 from palpate.segmentation import load_label_map
 from palpate.segmentation.boundaries import default_segments, selectors
-from palpate.viewer.upload import ENDINGS, Upload
+from palpate.viewer.setting_up import ENDINGS, Upload
 
 SEMI, AT, RADIUS = (40.0, 30.0, 22.0), (12.0, -6.0, 8.0), 7.0
 COARSE = (1.5, 1.5, 2.0)

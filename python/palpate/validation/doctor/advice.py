@@ -40,10 +40,7 @@ class Advice:
 
 
 def advice(
-    machine: Machine,
-    priority: bool | None,
-    locked_memory: bool | None,
-    taken: tuple[float, float] | None = None,
+    machine: Machine, priority: bool | None, locked_memory: bool | None, taken: tuple[float, float] | None = None
 ) -> list[Advice]:
     """Everything that would help, most important first.
 
@@ -56,16 +53,13 @@ def advice(
         return [Advice("system", finding, ("# run the force loop on Linux",))]
     return [
         *_priority(machine, priority),
-        *_quota(machine),
-        *_processors(machine),
-        *_load(taken),
+        *_processor_time(machine, taken),
         *_memory(machine, locked_memory),
         *_governor(machine),
         *_guest(machine, taken),
         *_kernel(machine),
         *_isolation(machine),
-        *_smt(machine),
-        *_clock(machine),
+        *_hardware(machine),
     ]
 
 
@@ -100,7 +94,7 @@ def _priority(machine: Machine, granted: bool | None) -> Iterator[Advice]:
     yield Advice("realtime-priority", finding, tuple(remedy))
 
 
-def _quota(machine: Machine) -> Iterator[Advice]:
+def _processor_time(machine: Machine, taken: tuple[float, float] | None) -> Iterator[Advice]:
     if machine.cpu_quota is not None:
         yield Advice(
             "cpu-quota",
@@ -113,18 +107,12 @@ def _quota(machine: Machine) -> Iterator[Advice]:
             f"real-time threads may take {100 * machine.rt_share:.0f} % of the time",
             ("sudo sysctl kernel.sched_rt_runtime_us=950000",),
         )
-
-
-def _processors(machine: Machine) -> Iterator[Advice]:
     if machine.allowed_cpus is not None and len(machine.allowed_cpus) == 1:
         yield Advice(
             "processors",
             f"the loop shares CPU {machine.allowed_cpus[0]} with everything else of this program",
             ("# give it two or more: taskset -c 0,1 palpate ..., or more CPUs for the machine",),
         )
-
-
-def _load(taken: tuple[float, float] | None) -> Iterator[Advice]:
     if taken is not None and taken[0] > BUSY:
         yield Advice(
             "load",
@@ -208,16 +196,13 @@ def _isolation(machine: Machine) -> Iterator[Advice]:
         )
 
 
-def _smt(machine: Machine) -> Iterator[Advice]:
+def _hardware(machine: Machine) -> Iterator[Advice]:
     if machine.smt:
         yield Advice(
             "smt",
             "two threads share a core (SMT): the neighbour slows a tick down",
             ("echo off | sudo tee /sys/devices/system/cpu/smt/control",),
         )
-
-
-def _clock(machine: Machine) -> Iterator[Advice]:
     source = machine.clock_source
     if source is not None and source not in FAST_CLOCKS:
         better = [name for name in machine.clock_sources or () if name in FAST_CLOCKS]

@@ -1,18 +1,18 @@
-"""Report of doctor: the machine, the measurements, the verdict and the advice."""
+"""Report of doctor: the machine, the measurements, the verdict and the advice, for a person and as JSON."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
-from palpate.devices import Listing
+from palpate.devices import Listing, listings
 from palpate.simulation.scheduling import cpu_ranges
-from palpate.validation.doctor.advice import Advice
-from palpate.validation.doctor.machine import UNLIMITED, Machine
-from palpate.validation.doctor.measure import PageRate, histogram
+from palpate.validation.doctor.advice import Advice, advice
+from palpate.validation.doctor.machine import UNLIMITED, Machine, processor_time, read_machine
+from palpate.validation.doctor.measure import PageRate, histogram, loop_times, page_rate
 from palpate.validation.ticks import LoopTimes, Times
 
 SCHEMA = 1
@@ -53,6 +53,16 @@ class Report:
         if too_slow or self.missed > MOST_MISSED or longest > LONGEST_GAP_US:
             return "not fit"
         return "fit" if self.missed == 0 else "fit with misses"
+
+
+def examine(seconds: float, report: Callable[[float], None] | None = None) -> Report:
+    """Read the system's settings and measure; ``report`` is called with the seconds that the loop has run."""
+    machine, before = read_machine(), processor_time()
+    loop, ticks = loop_times(seconds, report)
+    after = processor_time()
+    taken = None if before is None or after is None else after.shares_since(before)
+    advised = advice(machine, loop.priority, loop.locked_memory, taken)
+    return Report(machine, seconds, loop, ticks, page_rate(), advised, taken, tuple(listings()))
 
 
 def as_json(report: Report) -> dict[str, Any]:

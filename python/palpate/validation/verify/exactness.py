@@ -12,7 +12,7 @@ from palpate.mesh import TetMesh
 from palpate.mesh.elements import EDGES
 from palpate.mesh.shape_functions import values
 from palpate.validation.plots import plot_convergence
-from palpate.validation.verify.check import Check, Outcome
+from palpate.validation.verify.benchmark import Check, Outcome
 from palpate.validation.verify.grids import box, jittered
 
 SIZE = (0.08, 0.05, 0.05)

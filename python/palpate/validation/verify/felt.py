@@ -10,10 +10,9 @@ from palpate.body import Body, Material
 from palpate.green import GreensFunction
 from palpate.mesh import TetMesh
 from palpate.validation.plots import plot_felt_stiffness
-from palpate.validation.verify.check import Check, Outcome
+from palpate.validation.verify.benchmark import Check, Outcome, green_of, quiet_body
 from palpate.validation.verify.exactness import ORDER_NAMES
 from palpate.validation.verify.grids import box, lattice, mapped
-from palpate.validation.verify.solution import green_of, quiet_body
 
 # A cube glued to a table, pressed in the middle of its top by a patch of a quarter of its width, nothing fixing it
 # sideways.

@@ -20,9 +20,8 @@ import numpy as np
 
 from palpate.body import Body, Loads, Material
 from palpate.mesh import TetMesh
-from palpate.validation.verify.check import Check, Outcome
+from palpate.validation.verify.benchmark import Check, Outcome, at_node, green_of, surface_response, with_moved_supports
 from palpate.validation.verify.grids import cylindrical, lattice, mapped
-from palpate.validation.verify.solution import at_node, green_of, surface_response, with_moved_supports
 
 SOFT = Material(10e3, 0.45)
 RADIUS = 0.01

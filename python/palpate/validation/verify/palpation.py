@@ -12,7 +12,7 @@ import numpy as np
 from palpate.body import Material
 from palpate.palpation import Nodule, StiffnessMap, compare, stiffness_map
 from palpate.scene import BuiltScene, Scene
-from palpate.validation.verify.check import Check, Outcome
+from palpate.validation.verify.benchmark import Check, Outcome
 from palpate.validation.verify.contact.hidden_ball import HiddenBall
 
 Point = tuple[float, float]

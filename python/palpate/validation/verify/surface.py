@@ -11,7 +11,7 @@ from scipy.sparse.linalg import splu
 
 from palpate.body import Body, Material
 from palpate.green import GreensFunction, precompute
-from palpate.validation.verify.check import Check, Outcome
+from palpate.validation.verify.benchmark import Check, Outcome
 from palpate.validation.verify.grids import box
 
 SIDE = 0.1

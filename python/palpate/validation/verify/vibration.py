@@ -10,9 +10,8 @@ import scipy.optimize
 
 from palpate.body import Body, Material
 from palpate.dynamics import ModalBasis
-from palpate.validation.verify.check import Check, Outcome
+from palpate.validation.verify.benchmark import Check, Outcome, modes_of
 from palpate.validation.verify.grids import box
-from palpate.validation.verify.solution import modes_of
 
 # Beam of square section, ten times longer than deep.
 LENGTH, DEPTH = 0.1, 0.01

@@ -1,4 +1,4 @@
-"""Energy over closed paths of a tool: a contact must not give out more than was put in."""
+"""Energy over closed paths of a tool, of which a contact must not give out more than was put in, and sums of forces."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from palpate.body import Body
+from palpate.body import Body, Loads, Material
+from palpate.fields import Interior
 from palpate.scene import BodyMotion
 from palpate.simulation import Simulation
-from palpate.validation.verify.check import Check, Outcome
+from palpate.validation.verify.benchmark import Check, Outcome, green_of, modes_of, quiet_body
 from palpate.validation.verify.contact import measures
-from palpate.validation.verify.contact.closed_paths import ClosedPaths
 from palpate.validation.verify.contact.loop import loop_of, sphere
+from palpate.validation.verify.contact.paths import ClosedPaths
 from palpate.validation.verify.contact.reference import Block, body_on_table, top_nodes
-from palpate.validation.verify.solution import green_of, modes_of
+from palpate.validation.verify.grids import box
 
 RADIUS, TOLERANCE = 0.01, 1e-3
 # Farthest that a path leads from its middle along x and y, m.
@@ -24,8 +25,6 @@ SLIDE = 0.012
 FRICTIONS = (0.0, 0.3, 1.0)
 # Closed paths in all, divided among friction, one and two tools, rest and motion, and limits of the device.
 PATHS, TICKS = 10_000, 400
-# Limits that scenes have unless they say otherwise.
-DEFAULT_DEVICE: dict = {}
 PASSIVE = "passivity"
 
 
@@ -94,7 +93,7 @@ class EnergyBench:
     def simulation(self, condition: Condition) -> Simulation:
         """Force loop for a condition."""
         tools = [{**self.tool.table, "friction": condition.friction}] * condition.tools
-        device = DEFAULT_DEVICE if condition.limited else None
+        device: dict | None = {} if condition.limited else None  # the limits of scenes that give none
         return loop_of(self.body, self.green, tools, device, self.motion if condition.moving else None)
 
     def paths(self, condition: Condition, count: int) -> ClosedPaths:
@@ -132,3 +131,52 @@ class EnergyBench:
         paths = self.paths(condition, count)
         forces, torques = self.played(condition, paths)
         return measures.given_out(paths.positions, forces, paths.orientations, torques)
+
+
+def balance() -> Outcome:
+    """Drag two tools over a block that hangs from its bottom, under its weight."""
+    forces, reactions, loads = dragged()
+    checks = [Check("largest sum over the largest force", imbalance(forces, reactions, loads), 0.0, "statics", 1e-9)]
+    return Outcome(checks)
+
+
+def imbalance(forces: np.ndarray, reactions: np.ndarray, loads: np.ndarray) -> float:
+    """Largest sum of all forces on the body over the largest force of a tool.
+
+    Parameters
+    ----------
+    forces
+        (ticks, tools, 3) N, on the devices.
+    reactions
+        (ticks, 3) N, of all supports together.
+    loads
+        (3,) N, of all loads together.
+
+    """
+    total = reactions + loads - forces.sum(axis=1)
+    return float(np.abs(total).max() / np.abs(forces).max())
+
+
+def dragged(ticks: int = 60) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return forces on the devices, reactions of the supports from `K u` of every tick's shape, and loads."""
+    mesh = box((5, 5, 3), (0.08, 0.08, 0.048), quadratic=True)
+    loads = Loads(gravity=(0.0, 0.0, 9.81))
+    body = quiet_body(mesh, Material(10e3, 0.4, 1000.0), mesh.nodes[:, 2] < 1e-9, loads)
+    green = green_of(body)
+    simulation = loop_of(body, green, [sphere(RADIUS, 0.3)] * 2)
+    centres = np.array([[0.025, 0.04, 0.048], [0.055, 0.04, 0.048]])
+    paths = ClosedPaths.over(centres, RADIUS, paths=1, ticks=ticks, slide=8e-3, depth=(1e-3, 2e-3), seed=5)
+    recording = simulation.play(paths.positions[0], watch=[int(node) for node in body.mesh.surface_nodes])
+    return recording.forces, _reactions(body, recording.displacements), body.load_vector().reshape(-1, 3).sum(axis=0)
+
+
+def _reactions(body: Body, shapes: np.ndarray) -> np.ndarray:
+    """Return sums (ticks, 3), N, of the forces of the supports, from displacements (ticks, s, 3), m, of the surface."""
+    interior, stiffness = Interior(body), body.stiffness()
+    supported = body.fixed_mask
+    loads = body.load_vector().reshape(-1, 3)
+    sums = []
+    for shape in shapes:
+        forces = (stiffness @ interior.extend(shape).ravel()).reshape(-1, 3) - loads
+        sums.append(np.where(supported, forces, 0.0).sum(axis=0))
+    return np.array(sums)

@@ -15,14 +15,13 @@ from palpate.body import Body
 from palpate.green import GreensFunction
 from palpate.mesh import TetMesh
 from palpate.simulation import Simulation
-from palpate.validation.verify.check import Check, Outcome
+from palpate.validation.verify.benchmark import Check, Outcome, green_of, quiet_body
 from palpate.validation.verify.contact import measures, tools
-from palpate.validation.verify.contact.closed_paths import ClosedPaths
 from palpate.validation.verify.contact.loop import loop_of, sphere, straight
+from palpate.validation.verify.contact.paths import ClosedPaths
 from palpate.validation.verify.contact.reference import SOFT, graded
 from palpate.validation.verify.contact.signorini import ContactProblem, compliance_along, faces_on
 from palpate.validation.verify.grids import lattice, mapped
-from palpate.validation.verify.solution import green_of, quiet_body
 
 # Widths and height of the block, and the depth of its groove, m.
 SIZE, DEEP = (0.1, 0.1, 0.05), 0.02

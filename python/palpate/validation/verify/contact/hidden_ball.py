@@ -13,9 +13,9 @@ import numpy as np
 
 from palpate.body import Material
 from palpate.mesh import TetMesh
+from palpate.validation.verify.benchmark import green_of, quiet_body
 from palpate.validation.verify.contact import tools
 from palpate.validation.verify.contact.signorini import ContactProblem
-from palpate.validation.verify.solution import green_of, quiet_body
 
 MM = 1e-3
 # Size of the elements far away, in the ball, and under the sphere, mm.

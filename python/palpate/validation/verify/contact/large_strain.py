@@ -8,11 +8,10 @@ from palpate.body import Material
 from palpate.scene import BuiltScene, Scene
 from palpate.scene.series import with_series
 from palpate.simulation import Simulation
-from palpate.validation.verify.check import Check, Outcome
+from palpate.validation.verify.benchmark import Check, Outcome, green_of, quiet_body
 from palpate.validation.verify.contact.loop import UNLIMITED, pressed, sphere, straight
 from palpate.validation.verify.contact.reference import Block, finer_in_the_middle
 from palpate.validation.verify.grids import box
-from palpate.validation.verify.solution import green_of, quiet_body
 
 RADIUS, SOFT = 0.01, Material(10e3, 0.45, law="neo-hookean")
 # Depths, m, and forces, N, in the middle of a cylinder of 100 mm radius and 50 mm height that is bonded below: full

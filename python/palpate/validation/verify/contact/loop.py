@@ -11,8 +11,8 @@ from palpate.body import Body
 from palpate.green import GreensFunction
 from palpate.scene import BodyMotion, BuiltScene, Scene
 from palpate.simulation import Simulation
+from palpate.validation.verify.benchmark import green_of
 from palpate.validation.verify.contact.reference import top_middle, top_nodes
-from palpate.validation.verify.solution import green_of
 
 # A device that renders anything at once: what is measured is the law, not the safety stage.
 UNLIMITED = {"max_force": 1e6, "max_slew": 1e12, "ramp": 0.0, "max_stiffness": 1e9}

@@ -14,10 +14,10 @@ import numpy as np
 
 from palpate.body import Body, Material
 from palpate.mesh import TetMesh
-from palpate.validation.verify.contact.signorini import ContactProblem, Gap, Press
-from palpate.validation.verify.contact.tools import sphere
+from palpate.validation.verify.benchmark import green_of, quiet_body
+from palpate.validation.verify.contact.signorini import ContactProblem, Press
+from palpate.validation.verify.contact.tools import Gap, sphere
 from palpate.validation.verify.grids import box, lattice, mapped
-from palpate.validation.verify.solution import green_of, quiet_body
 
 SOFT = Material(10e3, 0.45)
 # Contact radius over the distance of surface nodes under the contact; ratio of neighbouring cells beside it, and of

@@ -27,9 +27,7 @@ from palpate.green import GreensFunction
 from palpate.mesh import TetMesh
 from palpate.mesh.elements import FACE_TRIANGLES
 from palpate.mesh.shape_functions import TRIANGLE_EDGES, TRIANGLE_NODES, TRIANGLE_POINTS, TRIANGLE_WEIGHTS, values
-
-# Height of the tool's underside over its lowest point (n,), m, at places (n, 2) of the plane, m; may be infinite.
-Gap = Callable[[np.ndarray], np.ndarray]
+from palpate.validation.verify.contact.tools import Gap
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Undersides of rigid tools: height over the lowest point, m, at places (n, 2) of the plane; infinite beside them."""
+"""Undersides of rigid tools: height over the lowest point, m, at places (n, 2), m, of the plane; may be infinite."""
 
 from __future__ import annotations
 
@@ -35,8 +35,3 @@ def rounded_punch(radius: float, rounding: float) -> Gap:
         return np.where(inside > 0, rounding - np.sqrt(np.maximum(inside, 0.0)), np.inf)
 
     return gap
-
-
-def nearest(*gaps: Gap) -> Gap:
-    """Several tools on one body."""
-    return lambda places: np.min([gap(places) for gap in gaps], axis=0)

@@ -1,9 +1,14 @@
-"""Files of node numbers, such as of supports that were painted: numbers apart by spaces, and comments after ``#``."""
+"""Text of a scene file from its tables, and files of node numbers, such as of supports that were painted.
+
+A file of nodes has numbers apart by spaces, and comments after ``#``.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import json
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +19,33 @@ from palpate.input_file import require_file
 ENDING = ".nodes"
 # Numbers in a line of a file that is written.
 IN_LINE = 16
+
+
+def scene_text(tables: Mapping[str, Any], comments: Mapping[str, str] | None = None) -> str:
+    """TOML of tables: a mapping is a table, a list of mappings is an array of tables, with a comment before each.
+
+    ``comments`` has a line by the name of a table; that of ``""`` stands first.
+    """
+    comments = comments or {}
+    blocks = [f"# {comments['']}"] if "" in comments else []
+    for name, table in tables.items():
+        several = isinstance(table, Sequence)
+        for entry in table if several else [table]:
+            head = f"[[{name}]]" if several else f"[{name}]"
+            lines = [f"# {comments[name]}"] if name in comments else []
+            blocks.append("\n".join([*lines, head, *(f"{key} = {_value(value)}" for key, value in entry.items())]))
+    return "\n\n".join(blocks) + "\n"
+
+
+def _value(value: Any) -> str:
+    # A basic string of TOML has the escapes of JSON, but for DEL (TOML 1.0, Strings).
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(map(_value, value))}]"
+    return repr(value)
 
 
 def is_node_file(value: object) -> bool:

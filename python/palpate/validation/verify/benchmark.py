@@ -1,10 +1,11 @@
-"""Solutions for benchmarks, by the same calls a user has."""
+"""Parts of a benchmark: figures with their targets, plots, and solutions by the same calls a user has."""
 
 from __future__ import annotations
 
 import tempfile
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +13,49 @@ import numpy as np
 from palpate.body import Body, Fixed, Loads, Material
 from palpate.dynamics import ModalBasis, modes
 from palpate.errors import LockingWarning, TouchWarning
-from palpate.fields import Interior
 from palpate.green import GreensFunction, precompute
 from palpate.mesh import TetMesh
+
+
+@dataclass(frozen=True)
+class Check:
+    """One figure beside its target."""
+
+    quantity: str  # what it is, with what it was computed on
+    # In ``unit``; a target of zero makes the error absolute.
+    computed: float
+    target: float
+    source: str  # where the target comes from
+    tolerance: float | None  # largest error that passes; None shows the figure without a verdict
+    unit: str = ""
+
+    @property
+    def error(self) -> float:
+        """Difference relative to the target; to one if that is zero."""
+        return abs(self.computed - self.target) / (abs(self.target) or 1.0)
+
+    @property
+    def passed(self) -> bool:
+        """Within the tolerance, or without one."""
+        return self.tolerance is None or self.error <= self.tolerance
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Checks of a benchmark, and its plots by file name: functions that draw into a path."""
+
+    checks: list[Check]
+    plots: dict[str, Callable[[Path], None]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Benchmark:
+    """A benchmark by name; ``slow`` ones take more than a few seconds."""
+
+    name: str
+    title: str
+    run: Callable[[], Outcome]
+    slow: bool = False
 
 
 def quiet_body(
@@ -45,11 +86,6 @@ def modes_of(body: Body, count: int) -> ModalBasis:
 def surface_response(body: Body) -> np.ndarray:
     """Displacements of the surface nodes under the body's loads, (s, 3) m."""
     return green_of(body, touch=body.mesh.surface_nodes[:1]).free_displacements
-
-
-def response(body: Body) -> np.ndarray:
-    """Displacements of all nodes under the body's loads, (n, 3) m."""
-    return Interior(body).extend(surface_response(body))
 
 
 def with_moved_supports(body: Body, motion: np.ndarray) -> Body:
