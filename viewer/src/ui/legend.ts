@@ -162,5 +162,5 @@ function titleOf({ body, region }: Group, { scene, coloring, settings }: Readonl
 function entry(color: string | null, title: string): HTMLElement {
   const swatch = create("span", { className: "key key-group" });
   if (color) swatch.style.backgroundColor = color;
-  return create("p", { className: "legend-key" }, swatch, title);
+  return create("p", { className: "line" }, swatch, title);
 }
