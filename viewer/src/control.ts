@@ -16,7 +16,7 @@ import type {
 } from "./net/protocol";
 import { groupings } from "./regions";
 import { NO_LAYERS, shownTool, inControl } from "./store";
-import type { Axis, Coloring, Layer, Posture, Store, Theme } from "./store";
+import type { Axis, Coloring, Layer, Posture, State, Store, Theme } from "./store";
 
 /** A slider dragged quickly sends no more often than this. */
 const SEND_INTERVAL_MS = 40;
@@ -180,22 +180,23 @@ export class Control {
 
   /** A field that is chosen wants to be seen. */
   chooseField(field: string): void {
-    const { layers } = this.store.get();
-    this.store.update({ field, coloring: "field", layers: { ...layers, colors: true } });
+    this.store.update({ field, coloring: "field", layers: this.coloredLayers() });
     this.sendField(field);
   }
 
   /** Tissue, with the colours of strain where it is strained. */
   chooseStrained(): void {
-    const { layers } = this.store.get();
-    this.store.update({ coloring: "strained", layers: { ...layers, colors: true } });
+    this.store.update({ coloring: "strained", layers: this.coloredLayers() });
     this.sendField(STRAIN);
   }
 
   /** Colours by region or by material. */
   chooseGrouping(coloring: "region" | "material"): void {
-    const { layers } = this.store.get();
-    this.store.update({ coloring, layers: { ...layers, colors: true } });
+    this.store.update({ coloring, layers: this.coloredLayers() });
+  }
+
+  private coloredLayers(): State["layers"] {
+    return { ...this.store.get().layers, colors: true };
   }
 
   /** The next field of the body, then its regions and materials, then tissue. */
@@ -319,17 +320,17 @@ export class Control {
   }
 
   /** Of the tool that is driven, or that the next press drives. */
-  setContactRadius(radius: number): void {
+  setContactRadius(contact_radius: number): void {
     const tool = shownTool(this.store.get()) ?? 0;
-    const message: ClientMessage = { type: "set", contact_radius: radius, tool };
-    this.set(`radius ${tool}`, message, (now) => ({ contact_radius: now.contact_radius.with(tool, radius) }));
+    const changed = (now: SettingsMessage) => ({ contact_radius: now.contact_radius.with(tool, contact_radius) });
+    this.set(`radius ${tool}`, { type: "set", contact_radius, tool }, changed);
   }
 
   /** Of the tool that is driven, or that the next press drives. */
   setFriction(friction: number): void {
     const tool = shownTool(this.store.get()) ?? 0;
-    const message: ClientMessage = { type: "set", friction, tool };
-    this.set(`friction ${tool}`, message, (now) => ({ friction: now.friction.with(tool, friction) }));
+    const changed = (now: SettingsMessage) => ({ friction: now.friction.with(tool, friction) });
+    this.set(`friction ${tool}`, { type: "set", friction, tool }, changed);
   }
 
   /** The strain at which tools are held; 0 never holds them. */

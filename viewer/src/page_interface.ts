@@ -6,6 +6,7 @@ import type { Pointer } from "./input/pointer";
 import type { RecordingStatus, ReplayFrame } from "./net/session_messages";
 import type { Carrier } from "./net/carrier";
 import type { FieldMessage, FrameMessage, MotionFrame, ToolFrame, Vec3 } from "./net/protocol";
+import { paintedNodes } from "./painting";
 import type { BodyView } from "./scene/body_view";
 import type { Stage } from "./scene/stage";
 import { drivenTool } from "./store";
@@ -42,13 +43,13 @@ export interface ViewerState {
   fault: string | null;
   /** Where an exam stands, whether the next body is awaited, and how loud its tone is. */
   exam: { trial: number; finished: boolean; answering: boolean; loudness: number } | null;
-  /** Of a body in motion, with the newest row of its history. */
   /** Of a body that is set up: whether it has its tetrahedra, how many nodes are painted, and the middle of its nodule. */
   filled: boolean;
   held: number;
   nodule: Vec3 | null;
   recording: RecordingStatus | null;
   replay: ReplayFrame | null;
+  /** Of a body in motion, with the newest row of its history. */
   motion: (MotionFrame & ReturnType<HistoryLog["latest"]>) | null;
 }
 
@@ -140,7 +141,7 @@ function viewerState({ store, pointer, statistics, history }: Parts): ViewerStat
     field: frame?.fields[state.body] ?? null,
     fault: frame?.fault ?? null,
     filled: state.setup?.body?.filled ?? false,
-    held: new Set(state.strokes.flatMap(([nodes]) => Array.from(nodes ?? []))).size,
+    held: paintedNodes(state.strokes, 0).size,
     nodule: state.setup?.body?.nodule?.center ?? null,
     recording: frame?.recording ?? null,
     replay: frame?.replay ?? null,

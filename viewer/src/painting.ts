@@ -63,14 +63,29 @@ export function heldStates({ strokes, scene }: Readonly<State>): Uint8Array | nu
   const count = scene?.bodies[0]?.surface_nodes;
   if (!count) return null;
   const states = new Uint8Array(count);
-  for (const [nodes] of strokes) for (const node of nodes ?? []) states[node] = PAINTED;
+  for (const node of paintedNodes(strokes, 0)) states[node] = PAINTED;
   return states;
 }
 
 /** Mask of all nodes of the first body that strokes have marked; null for none. */
 export function heldMask(strokes: readonly Stroke[], count: number): string | null {
-  const nodes = strokes.flatMap(([of]) => Array.from(of ?? []));
-  return nodes.length > 0 ? maskOfNodes(nodes, count) : null;
+  const nodes = paintedNodes(strokes, 0);
+  return nodes.size > 0 ? maskOfNodes(Array.from(nodes), count) : null;
+}
+
+/** Nodes of a body that strokes have marked. */
+export function paintedNodes(strokes: readonly Stroke[], body: number): Set<number> {
+  return new Set(strokes.flatMap((stroke) => Array.from(stroke[body] ?? [])));
+}
+
+/** Nodes of a surface by as many as a message takes: the first of those, their mask, and how many of them there are. */
+function messages(nodes: ReadonlySet<number>, count: number): { first: number; mask: string; size: number }[] {
+  return Array.from({ length: Math.ceil(count / NODES_A_MESSAGE) }, (_, i) => {
+    const first = i * NODES_A_MESSAGE;
+    const end = Math.min(first + NODES_A_MESSAGE, count);
+    const here = Array.from(nodes).filter((node) => node >= first && node < end).map((node) => node - first);
+    return { first, mask: maskOfNodes(here, end - first), size: here.length };
+  });
 }
 
 export class Painting {
@@ -133,12 +148,7 @@ export class Painting {
     const count = scene?.bodies[0]?.surface_nodes ?? 0;
     if (!setup?.body) return;
     this.store.update({ strokes, setup: { ...setup, body: { ...setup.body, held: heldMask(strokes, count), saved: null } } });
-    const nodes = new Set(strokes.flatMap(([of]) => Array.from(of ?? [])));
-    for (let first = 0; first < count; first += NODES_A_MESSAGE) {
-      const end = Math.min(first + NODES_A_MESSAGE, count);
-      const here = Array.from(nodes).filter((node) => node >= first && node < end).map((node) => node - first);
-      this.send({ type: "hold", first, nodes: maskOfNodes(here, end - first) });
-    }
+    for (const { first, mask } of messages(paintedNodes(strokes, 0), count)) this.send({ type: "hold", first, nodes: mask });
   }
 
   /** Asks for all that is painted. */
@@ -147,18 +157,12 @@ export class Painting {
     const { strokes, scene } = state;
     if (isPaintingSupports(state)) return this.leavePaintTool();
     if (!inControl(state) || !scene || strokes.length === 0) return;
-    const wanted = scene.bodies.map((_, body) => new Set(strokes.flatMap((stroke) => Array.from(stroke[body] ?? []))));
-    wanted.forEach((nodes, body) => this.ask(body, nodes, scene.bodies[body]!.surface_nodes));
+    scene.bodies.forEach(({ surface_nodes }, body) => {
+      for (const { first, mask, size } of messages(paintedNodes(strokes, body), surface_nodes)) {
+        if (size > 0) this.send({ type: "paint", body, first, nodes: mask });
+      }
+    });
     this.store.update({ strokes: [], paintTool: null });
-  }
-
-  /** A message takes so many nodes; one without any is not sent. */
-  private ask(body: number, nodes: ReadonlySet<number>, count: number): void {
-    for (let first = 0; first < count; first += NODES_A_MESSAGE) {
-      const end = Math.min(first + NODES_A_MESSAGE, count);
-      const here = Array.from(nodes).filter((node) => node >= first && node < end).map((node) => node - first);
-      if (here.length > 0) this.send({ type: "paint", body, first, nodes: maskOfNodes(here, end - first) });
-    }
   }
 
   private able(state: Readonly<State>): boolean {

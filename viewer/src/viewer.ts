@@ -31,7 +31,7 @@ import { Plots } from "./ui/plots";
 import { RecordButton } from "./ui/record_button";
 import { Readout } from "./ui/readout";
 import { DropZone } from "./ui/drop_zone";
-import { SeriesNote } from "./ui/series_note";
+import { followSeries } from "./ui/series_note";
 import { SetupPanel } from "./ui/setup_panel";
 import { ScaleView } from "./ui/scale_view";
 import { SettingsPanel } from "./ui/settings_panel";
@@ -99,7 +99,7 @@ export class Viewer {
     new ToolPanel(store, control);
     new MotionPanel(store, control);
     new PaintPanel(store, painting);
-    new SeriesNote(store);
+    followSeries(store);
     new SetupPanel(store, this.setup, painting, (text) => control.notice(text));
     new DropZone(store, this.setup);
     new RecordButton(store, control);

@@ -6,12 +6,13 @@ use std::ffi::c_char;
 
 use glam::DVec3;
 use palpate_core::simulation::{Contact, MAX_CONTACTS, MAX_TOOLS, Mode};
-use palpate_scene::PreparedScene;
+use palpate_scene::{PreparedScene, wxyz};
 use palpate_servo::{Published, Summary};
 
 use crate::arguments::{array_mut, exclusive, require_count, shared};
 use crate::force_loop::Loop;
 use crate::status::{Outcome, Status, catching_panics};
+use crate::store::put_triangles;
 use crate::versioned_struct::{self, VersionedStruct};
 
 /// Most tools of a scene.
@@ -124,11 +125,10 @@ impl Frame {
         }
         for tool in 0..tools {
             let (wrench, reading) = (&status.wrenches[tool], &status.readings[tool]);
-            let turned = reading.pose.orientation;
             frame.forces[tool] = wrench.force.to_array();
             frame.torques[tool] = wrench.torque.to_array();
             frame.positions[tool] = reading.pose.position.to_array();
-            frame.orientations[tool] = [turned.w, turned.x, turned.y, turned.z];
+            frame.orientations[tool] = wxyz(reading.pose.orientation);
             frame.active[tool] = u32::from(reading.active);
             frame.limited[tool] = u32::from(status.limited[tool]);
         }
@@ -283,10 +283,8 @@ pub unsafe extern "C" fn palpate_loop_get_triangles(
         let own = unsafe { shared(force_loop, "loop") }?;
         let side = own.frame();
         let surface = &side.prepared.model.bodies[side.body(body)?].green().surface;
-        require_count("triangles", triangles, surface.triangles.len())?;
-        // SAFETY: the caller's pointer, to `triangles` of three numbers.
-        unsafe { array_mut(nodes, 3 * triangles, "nodes") }?.copy_from_slice(surface.triangles.as_flattened());
-        Ok(())
+        // SAFETY: the caller's pointer.
+        unsafe { put_triangles(surface, nodes, triangles) }
     })
 }
 

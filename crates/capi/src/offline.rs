@@ -4,7 +4,7 @@
 
 use glam::DQuat;
 use palpate_core::simulation::Pose;
-use palpate_scene::unit_quaternion;
+use palpate_scene::{device_pose, wxyz};
 use palpate_servo::Script;
 
 use crate::arguments::{array, array_mut, optional_mut, require_count, shared};
@@ -46,11 +46,8 @@ pub unsafe extern "C" fn palpate_scene_run(
             // SAFETY: the caller's pointer.
             false => Some(unsafe { array(orientations.cast::<[f64; 4]>(), count, "orientations") }?),
         };
-        let orientation = |rank: usize| match turned {
-            Some(turned) if positions[rank].iter().all(|x| x.is_finite()) => unit_quaternion(turned[rank]),
-            _ => DQuat::IDENTITY,
-        };
-        let pose = |(rank, &at): (usize, &[f64; 3])| Pose { position: at.into(), orientation: orientation(rank) };
+        let orientation = |rank: usize| turned.map_or(wxyz(DQuat::IDENTITY), |turned| turned[rank]);
+        let pose = |(rank, &at): (usize, &[f64; 3])| device_pose(at, orientation(rank));
         let poses: Vec<Pose> = positions.iter().enumerate().map(pose).collect();
         let period = 1.0 / prepared.scheduling.rate;
         let script = Script { period, poses: &poses, grabs: &[], strikes: &[], watch: &[], devices: &prepared.devices };

@@ -6,10 +6,11 @@ use std::ffi::c_char;
 use std::sync::Arc;
 
 use palpate_core::green::GreensFunction;
+use palpate_core::mesh::Surface;
 use palpate_scene::moduli_of_store;
 
 use crate::arguments::{array_mut, free_handle, path, require_count, shared, store_handle};
-use crate::status::{Status, catching_panics};
+use crate::status::{Outcome, Status, catching_panics};
 use crate::versioned_struct::{self, VersionedStruct};
 
 /// A Green's function in memory. It never changes: any threads may use it at the same time.
@@ -119,10 +120,18 @@ pub unsafe extern "C" fn palpate_store_get_triangles(store: *const Store, nodes:
     catching_panics(|| {
         // SAFETY: the caller's pointer.
         let surface = &unsafe { shared(store, "store") }?.green.surface;
-        require_count("triangles", triangles, surface.triangles.len())?;
-        // SAFETY: the caller's pointer, to `triangles` of three numbers.
-        let out = unsafe { array_mut(nodes, 3 * triangles, "nodes") }?;
-        out.copy_from_slice(surface.triangles.as_flattened());
-        Ok(())
+        // SAFETY: the caller's pointer.
+        unsafe { put_triangles(surface, nodes, triangles) }
     })
+}
+
+/// Writes the triangles of a surface.
+///
+/// # Safety
+/// The pointer is null or points to `triangles` of three numbers.
+pub unsafe fn put_triangles(surface: &Surface, nodes: *mut u32, triangles: usize) -> Outcome {
+    require_count("triangles", triangles, surface.triangles.len())?;
+    // SAFETY: the caller's.
+    unsafe { array_mut(nodes, 3 * triangles, "nodes") }?.copy_from_slice(surface.triangles.as_flattened());
+    Ok(())
 }

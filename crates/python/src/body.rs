@@ -7,7 +7,7 @@ use palpate_core::mesh::{Faces, TetMesh, Tets};
 use palpate_core::{Error, Result};
 use pyo3::prelude::*;
 
-use crate::errors::to_python;
+use crate::errors::Answer;
 
 /// Column starts, rows and values of a compressed sparse matrix.
 type CscArrays<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<f64>>);
@@ -71,13 +71,9 @@ fn assembled<'py>(
     tets: &PyReadonlyArray2<'py, u32>,
     material: &PyReadonlyArray2<'py, f64>,
     assemble: impl FnOnce(&TetMesh, &[Isotropic]) -> SymmetricCsc + Send,
-) -> PyResult<CscArrays<'py>> {
-    let prepare = || {
-        let mesh = TetMesh::new(vectors(nodes)?, self::tets(tets)?)?;
-        let materials = materials(material, mesh.tets.len())?;
-        Ok((mesh, materials))
-    };
-    let (mesh, materials) = prepare().map_err(|e| to_python(py, e))?;
+) -> Answer<CscArrays<'py>> {
+    let mesh = TetMesh::new(vectors(nodes)?, self::tets(tets)?)?;
+    let materials = materials(material, mesh.tets.len())?;
     let matrix = py.detach(|| assemble(&mesh, &materials));
     Ok(to_arrays(py, matrix))
 }
@@ -89,7 +85,7 @@ pub fn stiffness<'py>(
     nodes: PyReadonlyArray2<'py, f64>,
     tets: PyReadonlyArray2<'py, u32>,
     material: PyReadonlyArray2<'py, f64>,
-) -> PyResult<CscArrays<'py>> {
+) -> Answer<CscArrays<'py>> {
     assembled(py, &nodes, &tets, &material, fem::stiffness)
 }
 
@@ -101,7 +97,7 @@ pub fn mass<'py>(
     tets: PyReadonlyArray2<'py, u32>,
     material: PyReadonlyArray2<'py, f64>,
     lumped: bool,
-) -> PyResult<CscArrays<'py>> {
+) -> Answer<CscArrays<'py>> {
     assembled(py, &nodes, &tets, &material, |mesh, materials| fem::mass(mesh, materials, lumped))
 }
 
@@ -111,9 +107,8 @@ pub fn determinant_ranges<'py>(
     py: Python<'py>,
     nodes: PyReadonlyArray2<'py, f64>,
     tets: PyReadonlyArray2<'py, u32>,
-) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let measure = || self::tets(&tets)?.determinant_ranges(&vectors(&nodes)?);
-    let ranges = measure().map_err(|e| to_python(py, e))?;
+) -> Answer<Bound<'py, PyArray1<f64>>> {
+    let ranges = self::tets(&tets)?.determinant_ranges(&vectors(&nodes)?)?;
     Ok(ranges.as_flattened().to_vec().into_pyarray(py))
 }
 
@@ -123,7 +118,6 @@ pub fn volumes<'py>(
     py: Python<'py>,
     nodes: PyReadonlyArray2<'py, f64>,
     tets: PyReadonlyArray2<'py, u32>,
-) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let measure = || self::tets(&tets)?.volumes(&vectors(&nodes)?);
-    Ok(measure().map_err(|e| to_python(py, e))?.into_pyarray(py))
+) -> Answer<Bound<'py, PyArray1<f64>>> {
+    Ok(self::tets(&tets)?.volumes(&vectors(&nodes)?)?.into_pyarray(py))
 }

@@ -5,15 +5,15 @@ use std::time::Duration;
 
 use palpate_core::simulation::{MAX_BODIES, MAX_TOOLS, PreviousRanks};
 use palpate_core::{Error, Result};
-use palpate_devices::simulated::{Target, simulated};
-use palpate_devices::{Device, DeviceLimits, MountedDevice, Workspace};
+use palpate_devices::DeviceLimits;
+use palpate_devices::simulated::{Target, simulated_with};
 use palpate_scene::{Body, BodyId, PreparedScene, Scene, ToolId, carried_over, placement};
 use pyo3::prelude::*;
 
 use crate::connection::{
     Connected, LimitsArguments, LoopDevice, OpenedDevice, WorkspaceArguments, limits_of, limits_tuple,
 };
-use crate::errors::to_python;
+use crate::errors::Answer;
 use crate::scene::{BodyArguments, ToolArguments, scene_body, scene_tool};
 use crate::series::Series;
 use crate::simulation::{RunningParts, SimulationCore};
@@ -32,13 +32,13 @@ pub fn connect(
     device: &mut OpenedDevice,
     workspace: WorkspaceArguments,
     limits: LimitsArguments,
-) -> PyResult<()> {
+) -> Answer<()> {
     let _alone = core.changing(py);
-    let connected = Connected::new(py, device, workspace, limits)?;
+    let connected = Connected::new(device, workspace, limits)?;
     let (limits, runs) = (connected.limits, core.parts(py).servo.is_some());
     if runs && connected.scheduler.is_some() {
         let message = "the device's driver calls the loop itself: stop the loop, and start it with the device";
-        return Err(to_python(py, Error::Invalid(message.into())));
+        return Err(Error::Invalid(message.into()).into());
     }
     let change = core.prepare_change(py, |scene| {
         let id = tool_at(scene, tool)?;
@@ -76,7 +76,7 @@ pub fn tool_stiffness(py: Python<'_>, core: &SimulationCore) -> Vec<(f64, f64)> 
 
 /// Takes the devices of all tools to be such, before the loop starts: those of a recording, or of a scene.
 #[pyfunction]
-pub fn assume_devices(py: Python<'_>, core: &SimulationCore, limits: Vec<LimitsArguments>) -> PyResult<()> {
+pub fn assume_devices(py: Python<'_>, core: &SimulationCore, limits: Vec<LimitsArguments>) -> Answer<()> {
     core.change_scene(py, |scene| {
         let tools: Vec<_> = scene.tools().map(|(id, _)| id).collect();
         for (id, limits) in tools.into_iter().zip(limits) {
@@ -92,7 +92,7 @@ pub fn set_strain_measures(
     py: Python<'_>,
     core: &SimulationCore,
     measures: Vec<PyRef<'_, StrainMeasure>>,
-) -> PyResult<()> {
+) -> Answer<()> {
     let measures: Vec<_> = measures.iter().map(|measure| measure.measure.clone()).collect();
     core.change_scene(py, |scene| {
         let bodies: Vec<_> = scene.bodies().map(|(id, _)| id).collect();
@@ -110,14 +110,14 @@ pub fn add_body(
     core: &SimulationCore,
     body: BodyArguments<'_>,
     measure: Option<PyRef<'_, StrainMeasure>>,
-) -> PyResult<u64> {
+) -> Answer<u64> {
     let body = Body { strain: measure.map(|measure| measure.measure.clone()), ..scene_body(&body)? };
     core.change_nodes(py, |scene| scene.add_body(body).map(|_| ()))
 }
 
 /// Exchanges a body for one of another store of the same surface.
 #[pyfunction]
-pub fn replace_body(py: Python<'_>, core: &SimulationCore, rank: usize, body: BodyArguments<'_>) -> PyResult<u64> {
+pub fn replace_body(py: Python<'_>, core: &SimulationCore, rank: usize, body: BodyArguments<'_>) -> Answer<u64> {
     let body = scene_body(&body)?;
     core.change_nodes(py, |scene| scene.replace_body(body_at(scene, rank)?, body))
 }
@@ -125,12 +125,12 @@ pub fn replace_body(py: Python<'_>, core: &SimulationCore, rank: usize, body: Bo
 /// Gives a body higher orders of its displacement below spheres of a radius, m. A running loop takes them up as soon as they change no
 /// force. Whether there was room for them: a loop that ticks makes room.
 #[pyfunction]
-pub fn set_series(py: Python<'_>, core: &SimulationCore, body: usize, radius: f64, series: &Series) -> PyResult<bool> {
+pub fn set_series(py: Python<'_>, core: &SimulationCore, body: usize, radius: f64, series: &Series) -> Answer<bool> {
     let _alone = core.changing(py);
     let series = py.detach(|| series.for_loop(radius));
     let mut parts = core.parts(py);
-    let id = body_at(&parts.scene, body).map_err(|e| to_python(py, e))?;
-    let model = parts.prepared.model.with_series(body, series.clone()).map_err(|e| to_python(py, e))?;
+    let id = body_at(&parts.scene, body)?;
+    let model = parts.prepared.model.with_series(body, series.clone())?;
     let before = std::mem::replace(&mut parts.prepared.model, Arc::new(model));
     let earlier = before.bodies[body].series().iter().filter(|earlier| earlier.radius == series.radius);
     parts.earlier_series.extend(earlier.map(|earlier| (id, earlier.radius, earlier.blocks.clone())));
@@ -170,7 +170,7 @@ pub fn tool_positions(py: Python<'_>, core: &SimulationCore) -> Vec<(usize, [f64
 
 /// Removes a body.
 #[pyfunction]
-pub fn remove_body(py: Python<'_>, core: &SimulationCore, rank: usize) -> PyResult<u64> {
+pub fn remove_body(py: Python<'_>, core: &SimulationCore, rank: usize) -> Answer<u64> {
     core.change_nodes(py, |scene| body_at(scene, rank).map(|id| drop(scene.remove_body(id))))
 }
 
@@ -182,7 +182,7 @@ pub fn place_body(
     rank: usize,
     position: [f64; 3],
     orientation: [f64; 4],
-) -> PyResult<u64> {
+) -> Answer<u64> {
     core.change_nodes(py, |scene| {
         let id = body_at(scene, rank)?;
         scene.place_body(id, placement(position, orientation));
@@ -192,13 +192,13 @@ pub fn place_body(
 
 /// Adds a tool, whose device is simulated.
 #[pyfunction]
-pub fn add_tool(py: Python<'_>, core: &SimulationCore, tool: ToolArguments) -> PyResult<u64> {
+pub fn add_tool(py: Python<'_>, core: &SimulationCore, tool: ToolArguments) -> Answer<u64> {
     core.change_nodes(py, |scene| scene.add_tool(scene_tool(tool)?).map(|_| ()))
 }
 
 /// Removes a tool.
 #[pyfunction]
-pub fn remove_tool(py: Python<'_>, core: &SimulationCore, rank: usize) -> PyResult<u64> {
+pub fn remove_tool(py: Python<'_>, core: &SimulationCore, rank: usize) -> Answer<u64> {
     core.change_nodes(py, |scene| tool_at(scene, rank).map(|id| drop(scene.remove_tool(id))))
 }
 
@@ -221,21 +221,20 @@ struct Change {
 
 impl SimulationCore {
     /// Prepares the scene as `edit` leaves it.
-    fn prepare_change(&self, py: Python<'_>, edit: impl FnOnce(&mut Scene) -> Result<()> + Send) -> PyResult<Change> {
+    fn prepare_change(&self, py: Python<'_>, edit: impl FnOnce(&mut Scene) -> Result<()> + Send) -> Answer<Change> {
         let (mut scene, before) = {
             let parts = self.parts(py);
             (parts.scene.clone(), parts.prepared.clone())
         };
-        let change = py.detach(|| -> Result<Change> {
+        Ok(py.detach(|| -> Result<Change> {
             edit(&mut scene)?;
             let (next, previous_ranks) = scene.prepare_change(&before)?;
             Ok(Change { scene, next, previous_ranks })
-        });
-        change.map_err(|e| to_python(py, e))
+        })?)
     }
 
     /// Changes what is known of bodies and tools, which all stay.
-    fn change_scene(&self, py: Python<'_>, edit: impl FnOnce(&mut Scene) -> Result<()> + Send) -> PyResult<()> {
+    fn change_scene(&self, py: Python<'_>, edit: impl FnOnce(&mut Scene) -> Result<()> + Send) -> Answer<()> {
         let _alone = self.changing(py);
         let change = self.prepare_change(py, edit)?;
         let devices = change.next.tools.iter().map(|_| None).collect();
@@ -243,7 +242,7 @@ impl SimulationCore {
     }
 
     /// Changes which bodies and tools there are; the number of the scene that it is now.
-    fn change_nodes(&self, py: Python<'_>, edit: impl FnOnce(&mut Scene) -> Result<()> + Send) -> PyResult<u64> {
+    fn change_nodes(&self, py: Python<'_>, edit: impl FnOnce(&mut Scene) -> Result<()> + Send) -> Answer<u64> {
         let _alone = self.changing(py);
         let change = self.prepare_change(py, edit)?;
         let mut parts = self.parts(py);
@@ -279,24 +278,18 @@ impl RunningParts {
             let device = device.into_inner().unwrap_or_else(PoisonError::into_inner);
             return LoopDevice { device, handle: None, scheduler };
         }
-        let (handle, device) = simulated();
-        let limits = self.prepared.devices.get(tool).copied().unwrap_or(DeviceLimits::UNLIMITED);
-        let device: Box<dyn Device> = match limits == DeviceLimits::UNLIMITED {
-            true => Box::new(device),
-            false => Box::new(MountedDevice::new(Box::new(device), Workspace::default(), &limits)),
-        };
+        let (handle, device) = simulated_with(self.prepared.devices.get(tool).unwrap_or(&DeviceLimits::UNLIMITED));
         LoopDevice { device, handle: Some(handle), scheduler: None }
     }
 
     /// Goes on with a changed scene, in the loop too if it runs, with devices where they are new.
-    fn exchange(&mut self, py: Python<'_>, change: Change, devices: Vec<Option<LoopDevice>>) -> PyResult<()> {
+    fn exchange(&mut self, py: Python<'_>, change: Change, devices: Vec<Option<LoopDevice>>) -> Answer<()> {
         let Change { scene, next, previous_ranks } = change;
         let new_tools: Vec<_> = previous_ranks.tools[..next.tools.len()].iter().map(Option::is_none).collect();
         let (handles, devices) =
             devices.into_iter().map(|new| new.map(|new| (new.handle, new.device)).unzip()).unzip::<_, _, _, Vec<_>>();
         let Self { prepared, servo, .. } = self;
-        py.detach(|| prepared.continue_with(next, previous_ranks, servo.as_mut(), devices))
-            .map_err(|e| to_python(py, e))?;
+        py.detach(|| prepared.continue_with(next, previous_ranks, servo.as_mut(), devices))?;
         self.handles = carried_over(std::mem::take(&mut self.handles), handles, &previous_ranks);
         let connected = new_tools.iter().map(|new| new.then_some(None)).collect();
         self.connected = carried_over(std::mem::take(&mut self.connected), connected, &previous_ranks);

@@ -7,7 +7,7 @@ use palpate_core::Error;
 use palpate_core::green::Claim;
 use pyo3::prelude::*;
 
-use crate::errors::to_python;
+use crate::errors::Answer;
 
 /// The right to write a store, until it is released.
 #[pyclass(frozen, module = "palpate._native")]
@@ -19,8 +19,8 @@ pub struct StoreClaim {
 impl StoreClaim {
     /// Claims the store at `path`; `None` while somebody else writes it.
     #[staticmethod]
-    fn take(py: Python<'_>, path: PathBuf) -> PyResult<Option<Self>> {
-        let claim = Claim::take(&path).map_err(|e| to_python(py, e))?;
+    fn take(path: PathBuf) -> Answer<Option<Self>> {
+        let claim = Claim::take(&path)?;
         Ok(claim.map(|claim| Self { claim: Arc::new(claim) }))
     }
 
@@ -31,7 +31,7 @@ impl StoreClaim {
 }
 
 /// A claim that Python has made, or a new one.
-pub(crate) fn claimed(py: Python<'_>, claim: Option<&StoreClaim>, path: PathBuf) -> PyResult<Arc<Claim>> {
+pub(crate) fn claimed(claim: Option<&StoreClaim>, path: PathBuf) -> Answer<Arc<Claim>> {
     if let Some(claim) = claim {
         return Ok(Arc::clone(&claim.claim));
     }
@@ -39,5 +39,5 @@ pub(crate) fn claimed(py: Python<'_>, claim: Option<&StoreClaim>, path: PathBuf)
         path: path.clone(),
         reason: "is being computed by another process: wait for it to end".into(),
     };
-    Claim::take(&path).and_then(|claim| claim.ok_or_else(busy)).map(Arc::new).map_err(|e| to_python(py, e))
+    Ok(Arc::new(Claim::take(&path)?.ok_or_else(busy)?))
 }

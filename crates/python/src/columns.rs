@@ -1,13 +1,12 @@
 //! Precomputation by several processes: some solve columns, one writes the store.
 
 use std::path::PathBuf;
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
 
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use palpate_core::green::accuracy::Accuracy;
 use palpate_core::green::{
-    AssembledProblem, ColumnStore as Store, Columns, Measurement, Precision, Problem, RequestedPrecision, Target,
-    TaskMemory, checksum,
+    AssembledProblem, ColumnStore as Store, Columns, Measurement, Precision, Problem, Target, TaskMemory, checksum,
 };
 use palpate_core::{Error, Result};
 use pyo3::prelude::*;
@@ -15,9 +14,9 @@ use pyo3::types::{PyBytes, PyTuple};
 
 use crate::allocator::require_scratch_of_products;
 use crate::claim::{StoreClaim, claimed};
-use crate::errors::to_python;
-use crate::green::{named, problem};
-use crate::interruptible::run_interruptible;
+use crate::errors::Answer;
+use crate::green::{problem, requested};
+use crate::interruptible::{locked, on_threads, run_interruptible};
 
 /// What a store needs to know of a factor: format, columns of a block, accuracy, free response (rows).
 type MeasurementTuple<'py> = (&'static str, usize, [f64; 5], Bound<'py, PyArray1<f64>>);
@@ -39,13 +38,9 @@ struct TaskMemories {
 }
 
 impl ColumnJob {
-    fn memories(&self) -> MutexGuard<'_, TaskMemories> {
-        self.working.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// Memory for a block, once as few others are being solved as the bound of memory allows.
     fn take(&self, width: usize) -> TaskMemory {
-        let mut memories = self.memories();
+        let mut memories = locked(&self.working);
         loop {
             if let Some((room, working)) = memories.free.pop() {
                 return if room >= width { working } else { self.columns.task_memory(width) };
@@ -66,7 +61,7 @@ impl ColumnJob {
             let panel = self.columns.solve(block, &mut working)?;
             Ok((panel.to_vec(), checksum(panel)))
         });
-        self.memories().free.push((width, working));
+        locked(&self.working).free.push((width, working));
         self.returned.notify_one();
         panel
     }
@@ -85,14 +80,12 @@ impl ColumnJob {
         within: f64,
         threads: usize,
         memory: Option<usize>,
-    ) -> PyResult<Self> {
+    ) -> Answer<Self> {
         let problem = problem(arguments)?;
-        let wanted = named(py, precision_name)?.map_or(RequestedPrecision::Within(within), RequestedPrecision::Named);
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        let pool = pool.map_err(|e| to_python(py, Error::Invalid(format!("no threads could be started: {e}"))))?;
-        require_scratch_of_products().map_err(|e| to_python(py, e))?;
+        let wanted = requested(precision_name, within)?;
+        require_scratch_of_products()?;
         let factored = || Columns::new(&problem, wanted, memory, false, &|_| {}, &|| Ok(()));
-        let columns = py.detach(|| pool.install(factored)).map_err(|e| to_python(py, e))?;
+        let columns = on_threads(py, threads, factored)?;
         let working = Mutex::new(TaskMemories { free: Vec::new(), allowed: columns.tasks });
         Ok(Self { columns, working, returned: Condvar::new() })
     }
@@ -116,8 +109,8 @@ impl ColumnJob {
         py: Python<'py>,
         block: usize,
         width: usize,
-    ) -> PyResult<(Bound<'py, PyBytes>, Bound<'py, PyBytes>)> {
-        let (panel, sum) = py.detach(|| self.solved(block, width)).map_err(|e| to_python(py, e))?;
+    ) -> Answer<(Bound<'py, PyBytes>, Bound<'py, PyBytes>)> {
+        let (panel, sum) = py.detach(|| self.solved(block, width))?;
         Ok((PyBytes::new(py, &panel), PyBytes::new(py, &sum)))
     }
 }
@@ -133,9 +126,9 @@ pub struct ColumnLayout {
 impl ColumnLayout {
     /// Assembles and orders.
     #[new]
-    fn new(py: Python<'_>, arguments: &Bound<'_, PyTuple>) -> PyResult<Self> {
+    fn new(py: Python<'_>, arguments: &Bound<'_, PyTuple>) -> Answer<Self> {
         let problem = problem(arguments)?;
-        let parts = py.detach(|| AssembledProblem::new(&problem)).map_err(|e| to_python(py, e))?;
+        let parts = py.detach(|| AssembledProblem::new(&problem))?;
         Ok(Self { problem, parts: Arc::new(parts) })
     }
 
@@ -150,12 +143,6 @@ impl ColumnLayout {
 #[pyclass(frozen, module = "palpate._native")]
 pub struct ColumnStore {
     store: Mutex<Store>,
-}
-
-impl ColumnStore {
-    fn store(&self) -> MutexGuard<'_, Store> {
-        self.store.lock().unwrap_or_else(PoisonError::into_inner)
-    }
 }
 
 #[pymethods]
@@ -173,52 +160,53 @@ impl ColumnStore {
         path: PathBuf,
         description: &str,
         claim: Option<&StoreClaim>,
-    ) -> PyResult<Self> {
+    ) -> Answer<Self> {
         let (name, width, accuracy, response) = measured;
-        let unusable = || to_python(py, Error::Invalid(format!("unusable blocks of {width} columns in '{name}'")));
+        let unusable = || Error::Invalid(format!("unusable blocks of {width} columns in '{name}'"));
         let precision = Precision::parse(&name).filter(|_| width > 0).ok_or_else(unusable)?;
         let accuracy = Accuracy::from_slice(&accuracy).ok_or_else(unusable)?;
         let measurement = Measurement { precision, accuracy, response: response.as_array().to_vec(), width };
-        let wanted = named(py, precision_name)?.map_or(RequestedPrecision::Within(within), RequestedPrecision::Named);
-        let claim = claimed(py, claim, path)?;
-        let target = Target { precision: wanted, memory: None, description, phase: &|_| {} };
+        let (precision, claim) = (requested(precision_name, within)?, claimed(claim, path)?);
+        let target = Target { precision, memory: None, description, phase: &|_| {} };
         let open = || Store::open(claim, &layout.problem, Arc::clone(&layout.parts), &measurement, &target);
-        let store = py.detach(open).map_err(|e| to_python(py, e))?;
+        let store = py.detach(open)?;
         Ok(Self { store: Mutex::new(store) })
     }
 
     /// Numbers of the blocks that are not there.
     fn missing(&self) -> Vec<usize> {
-        self.store().missing()
+        locked(&self.store).missing()
     }
 
     /// Columns in all.
     #[getter]
     fn columns(&self) -> usize {
-        self.store().columns()
+        locked(&self.store).columns()
     }
 
     /// Columns that are there.
     #[getter]
     fn done(&self) -> usize {
-        self.store().done()
+        locked(&self.store).done()
     }
 
     /// Whether something that belongs to another computation was thrown away.
     #[getter]
     fn discarded(&self) -> bool {
-        self.store().previous.discarded
+        locked(&self.store).previous.discarded
     }
 
     /// Keeps the panel of a block; whether it fits its checksum.
-    fn put(&self, py: Python<'_>, block: usize, panel: &[u8], sum: &[u8]) -> PyResult<bool> {
-        py.detach(|| self.store().receive(block, panel, sum)).map_err(|e| to_python(py, e))
+    fn put(&self, py: Python<'_>, block: usize, panel: &[u8], sum: &[u8]) -> Answer<bool> {
+        Ok(py.detach(|| locked(&self.store).receive(block, panel, sum))?)
     }
 
     /// Writes the store, by all threads; `progress` as everywhere.
     #[pyo3(signature = (progress=None))]
-    fn finish(&self, py: Python<'_>, progress: Option<Py<PyAny>>) -> PyResult<()> {
+    fn finish(&self, py: Python<'_>, progress: Option<Py<PyAny>>) -> Answer<()> {
         let total = self.columns();
-        run_interruptible(py, total, progress.as_ref(), |note| self.store().finish(rayon::current_num_threads(), note))
+        run_interruptible(py, total, progress.as_ref(), |note| {
+            locked(&self.store).finish(rayon::current_num_threads(), note)
+        })
     }
 }

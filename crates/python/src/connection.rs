@@ -3,13 +3,13 @@
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use palpate_core::{Error, Result};
+use palpate_core::Error;
 use palpate_devices::simulated::Handle;
 use palpate_devices::{Connection, Device, DeviceLimits, MountedDevice, OpenError, ReadyDevice, Scheduler, Workspace};
+use palpate_scene::unit_quaternion;
 use pyo3::prelude::*;
 
-use crate::errors::raised;
-use crate::scene::quaternion;
+use crate::errors::Answer;
 
 /// Largest force (N), torque (N m), stiffness (N/m), damping (N s/m), damping of rotation (N m s/rad), own damping (N s/m)
 /// or None, delay (s), greatest speed (m/s) or None, greatest rate (Hz) or None.
@@ -42,11 +42,6 @@ pub fn limits_tuple(limits: &DeviceLimits) -> LimitsArguments {
     (l.max_force, l.max_torque, l.max_stiffness, damping, turning, l.own_damping, l.delay, l.max_speed, l.rate)
 }
 
-/// The package's own exception for a device that cannot be opened.
-pub fn device_error(py: Python<'_>, error: &OpenError) -> PyErr {
-    raised(py, "DeviceError", error.to_string())
-}
-
 /// A device that has been opened, until a loop takes it.
 #[pyclass(module = "palpate._native")]
 pub struct OpenedDevice {
@@ -68,10 +63,10 @@ impl OpenedDevice {
     ///
     /// # Errors
     /// A device that a loop has taken already.
-    pub fn take(&mut self, py: Python<'_>) -> PyResult<ReadyDevice> {
+    pub fn take(&mut self) -> Result<ReadyDevice, OpenError> {
         let taken = || OpenError::new(self.name.clone(), "another loop has this device: open it once more");
         let opened = self.opened.get_mut().unwrap_or_else(PoisonError::into_inner).take();
-        opened.ok_or_else(|| device_error(py, &taken()))
+        opened.ok_or_else(taken)
     }
 }
 
@@ -85,10 +80,9 @@ impl OpenedDevice {
         id: Option<String>,
         address: Option<String>,
         library: Option<PathBuf>,
-    ) -> PyResult<Self> {
+    ) -> Answer<Self> {
         let connection = Connection { id, address, library };
-        let opened = py.detach(|| palpate_devices::open(kind, &connection));
-        opened.map(Self::from).map_err(|error| device_error(py, &error))
+        Ok(py.detach(|| palpate_devices::open(kind, &connection))?.into())
     }
 
     /// What a person knows it by.
@@ -118,15 +112,14 @@ impl Connected {
     /// # Errors
     /// A device that a loop has taken already.
     pub fn new(
-        py: Python<'_>,
         device: &mut OpenedDevice,
         workspace: WorkspaceArguments,
         limits: LimitsArguments,
-    ) -> PyResult<Self> {
+    ) -> Result<Self, OpenError> {
         let (position, orientation, scale, force_scale, clutch) = workspace;
-        let workspace =
-            Workspace { position: position.into(), orientation: quaternion(orientation), scale, force_scale, clutch };
-        let ReadyDevice { device, scheduler } = device.take(py)?;
+        let (position, orientation) = (position.into(), unit_quaternion(orientation));
+        let workspace = Workspace { position, orientation, scale, force_scale, clutch };
+        let ReadyDevice { device, scheduler } = device.take()?;
         let mounted = MountedDevice::new(device, workspace, &limits_of(limits));
         Ok(Self { limits: mounted.limits(), device: Mutex::new(Box::new(mounted)), scheduler })
     }
@@ -143,7 +136,7 @@ pub struct LoopDevice {
 ///
 /// # Errors
 /// Two of them, or one at another rate than the scene's.
-pub fn common_scheduler(devices: &[LoopDevice], rate: f64) -> Result<Option<Arc<dyn Scheduler>>> {
+pub fn common_scheduler(devices: &[LoopDevice], rate: f64) -> palpate_core::Result<Option<Arc<dyn Scheduler>>> {
     let mut schedulers = devices.iter().filter_map(|device| device.scheduler.clone());
     let Some(first) = schedulers.next() else { return Ok(None) };
     if schedulers.any(|other| !Arc::ptr_eq(&first, &other)) {

@@ -7,8 +7,8 @@ use palpate_servo::{LARGEST_FORCE, SelfCheck, Task};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-use crate::connection::{LimitsArguments, OpenedDevice, device_error, limits_tuple};
-use crate::errors::to_python;
+use crate::connection::{LimitsArguments, OpenedDevice, limits_tuple};
+use crate::errors::Answer;
 
 /// Kinds of devices that there are drivers for.
 #[pyfunction]
@@ -24,9 +24,9 @@ pub fn list_devices<'py>(
     kind: &str,
     address: Option<String>,
     library: Option<PathBuf>,
-) -> PyResult<Bound<'py, PyDict>> {
+) -> Answer<Bound<'py, PyDict>> {
     let connection = Connection { id: None, address, library };
-    let listing = py.detach(|| list(kind, &connection)).map_err(|error| device_error(py, &error))?;
+    let listing = py.detach(|| list(kind, &connection))?;
     let found = PyList::empty(py);
     for FoundDevice { id, name, limits, obstacle, facts } in listing.found {
         let device = PyDict::new(py);
@@ -54,9 +54,9 @@ pub struct DeviceCheck {
 impl DeviceCheck {
     /// Begins to watch a device.
     #[new]
-    fn new(py: Python<'_>, device: &mut OpenedDevice) -> PyResult<Self> {
-        let opened = device.take(py)?;
-        let check = py.detach(|| SelfCheck::start(opened)).map_err(|error| to_python(py, error))?;
+    fn new(py: Python<'_>, device: &mut OpenedDevice) -> Answer<Self> {
+        let opened = device.take()?;
+        let check = py.detach(|| SelfCheck::start(opened))?;
         Ok(Self { check })
     }
 
@@ -76,13 +76,13 @@ impl DeviceCheck {
     }
 
     /// Pushes along a unit vector with a force, N, that rises over `seconds`, or watches along none.
-    fn begin(&mut self, py: Python<'_>, direction: [f64; 3], force: f64, seconds: f64) -> PyResult<()> {
+    fn begin(&mut self, direction: [f64; 3], force: f64, seconds: f64) -> Answer<()> {
         let task = Task { direction: direction.into(), force, seconds };
-        self.check.begin(task).map_err(|error| to_python(py, error))
+        Ok(self.check.begin(task)?)
     }
 
     /// What has been seen of it so far; None before its first tick.
-    fn seen<'py>(&mut self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+    fn seen<'py>(&mut self, py: Python<'py>) -> Answer<Option<Bound<'py, PyDict>>> {
         let Some(seen) = self.check.observation() else { return Ok(None) };
         let readings = PyDict::new(py);
         readings.set_item("time", seen.time)?;

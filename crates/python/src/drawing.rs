@@ -6,7 +6,7 @@ use palpate_core::Error;
 use pyo3::prelude::*;
 
 use crate::body::vectors;
-use crate::errors::to_python;
+use crate::errors::Answer;
 
 /// About `target` of the triangles (3k) with corners among `positions` (n, 3), and how far from the surface they lie, in the
 /// unit of the positions. Corners stay where they are: every vertex of the answer is one of the given. Those of `kept` stay.
@@ -17,10 +17,10 @@ pub fn simplified<'py>(
     triangles: PyReadonlyArray1<'py, u32>,
     locked: PyReadonlyArray1<'py, bool>,
     target: usize,
-) -> PyResult<(Bound<'py, PyArray1<u32>>, f32)> {
-    let positions = vectors(&positions).map_err(|e| to_python(py, e))?;
+) -> Answer<(Bound<'py, PyArray1<u32>>, f32)> {
+    let positions = vectors(&positions)?;
     let (corners, locked): (Vec<u32>, Vec<bool>) = (triangles.as_array().to_vec(), locked.as_array().to_vec());
-    let found = py.detach(|| fewer(&positions, &corners, &locked, target)).map_err(|e| to_python(py, e))?;
+    let found = py.detach(|| fewer(&positions, &corners, &locked, target))?;
     Ok((found.0.into_pyarray(py), found.1))
 }
 

@@ -14,7 +14,7 @@ use palpate_core::{Error, Result};
 use pyo3::prelude::*;
 
 use crate::allocator::require_scratch_of_products;
-use crate::errors::to_python;
+use crate::errors::Answer;
 
 /// Steps between two looks at Ctrl-C.
 const STEPS_UNWATCHED: usize = 500;
@@ -49,7 +49,7 @@ fn tuple(energies: Energy) -> EnergyTuple {
 }
 
 /// Runs `step` `count` times without the interpreter lock, looking for Ctrl-C now and then.
-fn repeat(py: Python<'_>, count: usize, mut step: impl FnMut(usize) + Send) -> PyResult<()> {
+fn repeat(py: Python<'_>, count: usize, mut step: impl FnMut(usize) + Send) -> Answer<()> {
     let mut done = 0;
     while done < count {
         let until = count.min(done + STEPS_UNWATCHED);
@@ -70,30 +70,31 @@ fn played<'py>(
     count: usize,
     (rows, forces, watch): ForceHistory<'py>,
     mut step: impl FnMut(&[(u32, f64)], &[usize], &mut [f64]) + Send,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
+) -> Answer<Bound<'py, PyArray2<f64>>> {
     let forces = forces.as_array();
     if forces.ncols() != rows.len() || watch.iter().any(|&r| r >= count) {
-        return Err(to_python(py, Error::Invalid("the rows do not fit the forces or the body".into())));
+        return Err(Error::Invalid("the rows do not fit the forces or the body".into()).into());
     }
     let mut seen = vec![0.0; forces.nrows() * watch.len()];
     repeat(py, forces.nrows(), |i| {
         let now: Vec<(u32, f64)> = rows.iter().copied().zip(forces.row(i).iter().copied()).collect();
         step(&now, &watch, &mut seen[i * watch.len()..(i + 1) * watch.len()]);
     })?;
-    seen.into_pyarray(py).reshape([forces.nrows(), watch.len()])
+    Ok(seen.into_pyarray(py).reshape([forces.nrows(), watch.len()])?)
 }
 
 /// Largest stable time step, s, for a largest eigenvalue (1/s^2); infinite where every step is stable.
 #[pyfunction]
-pub fn largest_stable_dt(py: Python<'_>, arguments: SchemeArguments, eigenvalue: f64) -> PyResult<f64> {
-    let (newmark, rayleigh) = scheme(arguments).map_err(|e| to_python(py, e))?;
+pub fn largest_stable_dt(arguments: SchemeArguments, eigenvalue: f64) -> Answer<f64> {
+    let (newmark, rayleigh) = scheme(arguments)?;
     Ok(newmark.largest_stable_dt(&rayleigh, eigenvalue))
 }
 
 /// Refuses an unstable time step.
 #[pyfunction]
-pub fn require_stable(py: Python<'_>, arguments: SchemeArguments, eigenvalue: f64) -> PyResult<()> {
-    scheme(arguments).and_then(|(n, r)| n.require_stable(&r, eigenvalue)).map_err(|e| to_python(py, e))
+pub fn require_stable(arguments: SchemeArguments, eigenvalue: f64) -> Answer<()> {
+    let (newmark, rayleigh) = scheme(arguments)?;
+    Ok(newmark.require_stable(&rayleigh, eigenvalue)?)
 }
 
 /// Content key of modes from the bytes that determine them.
@@ -111,10 +112,10 @@ pub fn save_basis(
     description: String,
     eigenvalues: PyReadonlyArray1<'_, f64>,
     shapes: PyReadonlyArray2<'_, f64>,
-) -> PyResult<()> {
+) -> Answer<()> {
     let (eigenvalues, shapes) = (eigenvalues.as_slice()?.to_vec(), shapes.as_slice()?.to_vec());
     let basis = Basis { key, description, eigenvalues, shapes };
-    py.detach(|| basis.save(&path)).map_err(|e| to_python(py, e))
+    Ok(py.detach(|| basis.save(&path))?)
 }
 
 /// Key, description, eigenvalues (m) and shapes (3n m) of a verified file.
@@ -123,8 +124,8 @@ pub fn save_basis(
 pub fn load_basis(
     py: Python<'_>,
     path: PathBuf,
-) -> PyResult<(String, String, Bound<'_, PyArray1<f64>>, Bound<'_, PyArray1<f64>>)> {
-    let basis = py.detach(|| Basis::load(&path)).map_err(|e| to_python(py, e))?;
+) -> Answer<(String, String, Bound<'_, PyArray1<f64>>, Bound<'_, PyArray1<f64>>)> {
+    let basis = py.detach(|| Basis::load(&path))?;
     Ok((basis.key, basis.description, basis.eigenvalues.into_pyarray(py), basis.shapes.into_pyarray(py)))
 }
 
@@ -138,19 +139,19 @@ pub struct SparseFactor {
 impl SparseFactor {
     /// Orders and factorises.
     #[new]
-    fn new(py: Python<'_>, arguments: CscArguments<'_>, fixed: Vec<u32>) -> PyResult<Self> {
+    fn new(py: Python<'_>, arguments: CscArguments<'_>, fixed: Vec<u32>) -> Answer<Self> {
         let matrix = matrix(&arguments);
-        require_scratch_of_products().map_err(|e| to_python(py, e))?;
+        require_scratch_of_products()?;
         let make = || Factor::new(&matrix, &partition(matrix.dimension, fixed)?, Par::rayon(0));
-        Ok(Self { factor: py.detach(make).map_err(|e| to_python(py, e))? })
+        Ok(Self { factor: py.detach(make)? })
     }
 
     /// Solution on the free dofs for a right-hand side on them.
-    fn solve<'py>(&self, py: Python<'py>, right: PyReadonlyArray1<'py, f64>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    fn solve<'py>(&self, py: Python<'py>, right: PyReadonlyArray1<'py, f64>) -> Answer<Bound<'py, PyArray1<f64>>> {
         let mut x = right.as_array().to_vec();
         let rows = self.factor.dimension();
         if x.len() != rows {
-            return Err(to_python(py, Error::Invalid(format!("{rows} numbers are needed, got {}", x.len()))));
+            return Err(Error::Invalid(format!("{rows} numbers are needed, got {}", x.len())).into());
         }
         py.detach(|| {
             let mut memory = self.factor.solve_scratch(1);
@@ -181,7 +182,7 @@ impl ModalMotion {
         exact: bool,
         displacements: PyReadonlyArray1<'_, f64>,
         velocities: PyReadonlyArray1<'_, f64>,
-    ) -> PyResult<Self> {
+    ) -> Answer<Self> {
         let (k, shapes) = (eigenvalues.as_slice()?, shapes.as_slice()?);
         let (q, v) = (displacements.as_slice()?, velocities.as_slice()?);
         let build = || -> Result<Self> {
@@ -193,11 +194,11 @@ impl ModalMotion {
             let (scratch, account) = (model.scratch(), EnergyAccount::new(&model, &state));
             Ok(Self { model, state, scratch, account })
         };
-        py.detach(build).map_err(|e| to_python(py, e))
+        Ok(py.detach(build)?)
     }
 
     /// Makes `count` steps under constant forces at rows.
-    fn step(&mut self, py: Python<'_>, forces: Vec<(u32, f64)>, count: usize) -> PyResult<()> {
+    fn step(&mut self, py: Python<'_>, forces: Vec<(u32, f64)>, count: usize) -> Answer<()> {
         repeat(py, count, |_| {
             self.model.step(&mut self.state, &mut self.scratch, &forces);
             self.account.book(&self.model, &self.state);
@@ -211,7 +212,7 @@ impl ModalMotion {
         rows: Vec<u32>,
         forces: PyReadonlyArray2<'py, f64>,
         watch: Vec<usize>,
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    ) -> Answer<Bound<'py, PyArray2<f64>>> {
         played(py, self.model.rows(), (rows, forces, watch), |now, watch, out| {
             self.model.step(&mut self.state, &mut self.scratch, now);
             self.account.book(&self.model, &self.state);
@@ -220,10 +221,10 @@ impl ModalMotion {
     }
 
     /// Displacements, velocities or accelerations (`order` 0, 1, 2) at rows; None: at all.
-    fn at<'py>(&self, py: Python<'py>, rows: Option<Vec<usize>>, order: usize) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    fn at<'py>(&self, py: Python<'py>, rows: Option<Vec<usize>>, order: usize) -> Answer<Bound<'py, PyArray1<f64>>> {
         let rows = rows.unwrap_or_else(|| (0..self.model.rows()).collect());
         if rows.iter().any(|&r| r >= self.model.rows()) {
-            return Err(to_python(py, Error::Invalid("a row does not exist".into())));
+            return Err(Error::Invalid("a row does not exist".into()).into());
         }
         let mut out = vec![0.0; rows.len()];
         py.detach(|| self.model.read(&self.modal_numbers(order), rows.into_iter(), &mut out));
@@ -274,7 +275,7 @@ impl DirectMotion {
         dense: bool,
         displacements: PyReadonlyArray1<'_, f64>,
         velocities: PyReadonlyArray1<'_, f64>,
-    ) -> PyResult<Self> {
+    ) -> Answer<Self> {
         let (stiffness, mass) = (matrix(&stiffness), matrix(&mass));
         let (u, v) = (displacements.as_slice()?, velocities.as_slice()?);
         let solver = if dense { Solver::Inverse } else { Solver::Factor };
@@ -284,11 +285,11 @@ impl DirectMotion {
             let (state, scratch) = (direct.state(u, v)?, direct.scratch());
             Ok(Self { direct, state, scratch })
         };
-        py.detach(build).map_err(|e| to_python(py, e))
+        Ok(py.detach(build)?)
     }
 
     /// Makes `count` steps under constant forces at dofs.
-    fn step(&mut self, py: Python<'_>, forces: Vec<(u32, f64)>, count: usize) -> PyResult<()> {
+    fn step(&mut self, py: Python<'_>, forces: Vec<(u32, f64)>, count: usize) -> Answer<()> {
         let force = self.spread(&forces);
         repeat(py, count, |_| self.direct.step(&mut self.state, &mut self.scratch, &force))
     }
@@ -301,7 +302,7 @@ impl DirectMotion {
         rows: Vec<u32>,
         forces: PyReadonlyArray2<'py, f64>,
         watch: Vec<usize>,
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    ) -> Answer<Bound<'py, PyArray2<f64>>> {
         played(py, self.state.u.len(), (rows, forces, watch), |now, watch, out| {
             let force = self.spread(now);
             self.direct.step(&mut self.state, &mut self.scratch, &force);
@@ -310,7 +311,7 @@ impl DirectMotion {
     }
 
     /// Displacements, velocities or accelerations (`order` 0, 1, 2) at dofs; None: at all.
-    fn at<'py>(&self, py: Python<'py>, rows: Option<Vec<usize>>, order: usize) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    fn at<'py>(&self, py: Python<'py>, rows: Option<Vec<usize>>, order: usize) -> Answer<Bound<'py, PyArray1<f64>>> {
         let rows = rows.unwrap_or_else(|| (0..self.state.u.len()).collect());
         let all = match order {
             0 => &self.state.u,
@@ -318,7 +319,8 @@ impl DirectMotion {
             _ => &self.state.a,
         };
         let values: Option<Vec<f64>> = rows.iter().map(|&row| all.get(row).copied()).collect();
-        values.map(|v| v.into_pyarray(py)).ok_or_else(|| to_python(py, Error::Invalid("a row does not exist".into())))
+        let missing = || Error::Invalid("a row does not exist".into());
+        Ok(values.ok_or_else(missing)?.into_pyarray(py))
     }
 
     /// Kinetic, strain, dissipated energy and work, J.

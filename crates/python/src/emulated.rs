@@ -11,7 +11,7 @@ use palpate_servo::{Emulation, SafetyLimits};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::errors::to_python;
+use crate::errors::Answer;
 use crate::simulation::SimulationCore;
 
 /// Mass (kg), damping (N s/m), dry friction (N), step of the encoder (m) and delay (s) of a tip.
@@ -45,7 +45,7 @@ pub fn emulate<'py>(
     limits: Option<[f64; 4]>,
     period: f64,
     until: (usize, f64),
-) -> PyResult<Bound<'py, PyDict>> {
+) -> Answer<Bound<'py, PyDict>> {
     let (ticks, reach) = until;
     let starts: Vec<DVec3> = devices.iter().map(|(_, _, [start, _], _, _)| DVec3::from(*start)).collect();
     let devices = devices.into_iter().map(device).collect();
@@ -69,7 +69,7 @@ pub fn emulate<'py>(
             if runs_away || tick.number + 1 >= ticks { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })
     });
-    ran.map_err(|e| to_python(py, e))?;
+    ran?;
     let answer = PyDict::new(py);
     for (name, column) in ["positions", "velocities", "measured", "forces"].into_iter().zip(columns) {
         answer.set_item(name, column.into_pyarray(py))?;

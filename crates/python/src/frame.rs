@@ -3,22 +3,23 @@
 use numpy::IntoPyArray;
 use palpate_core::simulation::{Model, Snapshot};
 use palpate_devices::DeviceFault;
+use palpate_scene::wxyz;
 use palpate_servo::{Fault, FaultReason, LogRow, Published};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-use crate::errors::to_python;
-use crate::scene::{contact_records, energy_array, wxyz};
+use crate::errors::Answer;
+use crate::scene::{contact_records, energy_array};
 
 /// A tick as a dictionary.
-pub fn frame<'py>(py: Python<'py>, model: &Model, published: Published) -> PyResult<Bound<'py, PyDict>> {
+pub fn frame<'py>(py: Python<'py>, model: &Model, published: Published) -> Answer<Bound<'py, PyDict>> {
     let Published { status, state } = published;
     let tools = model.tools.len();
     let surfaces = py.detach(|| {
         let intact = model.bodies.iter().try_for_each(|body| body.green().require_intact());
         intact.map(|()| (0..model.bodies.len()).map(|body| state.displacements(model, body)).collect::<Vec<_>>())
     });
-    let surfaces = surfaces.map_err(|e| to_python(py, e))?;
+    let surfaces = surfaces?;
     let frame = PyDict::new(py);
     let bodies = PyList::empty(py);
     for (body, displacements) in surfaces.into_iter().enumerate() {

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use glam::DVec3;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2};
@@ -15,14 +15,15 @@ use palpate_core::green::{
 };
 use palpate_core::mesh::TetMesh;
 use palpate_core::{Error, Result, contact};
+use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyTuple};
 
 use crate::allocator::require_scratch_of_products;
 use crate::body::{self, indices, materials, vectors};
 use crate::claim::{StoreClaim, claimed};
-use crate::errors::to_python;
-use crate::interruptible::{run_interruptible, run_interruptible_and};
+use crate::errors::Answer;
+use crate::interruptible::{locked, run_interruptible, run_interruptible_and};
 
 /// A Green's function in memory, or in memory and its store.
 #[pyclass(frozen, module = "palpate._native")]
@@ -34,7 +35,7 @@ type SurfaceModuli<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>,
 
 /// The reference problem from `(nodes, tets, material, fixed_dofs, surface_nodes, surface_faces, touch, loads)`;
 /// `loads` (3n) in N, empty for none.
-pub(crate) fn problem(arguments: &Bound<'_, PyTuple>) -> PyResult<Problem> {
+pub(crate) fn problem(arguments: &Bound<'_, PyTuple>) -> Answer<Problem> {
     type Arguments<'py> = (
         PyReadonlyArray2<'py, f64>,
         PyReadonlyArray2<'py, u32>,
@@ -46,21 +47,18 @@ pub(crate) fn problem(arguments: &Bound<'_, PyTuple>) -> PyResult<Problem> {
         PyReadonlyArray1<'py, f64>,
     );
     let (nodes, tets, material, fixed, surface_nodes, faces, touch, loads): Arguments<'_> = arguments.extract()?;
-    let build = || -> Result<Problem> {
-        let mesh = TetMesh::new(vectors(&nodes)?, body::tets(&tets)?)?;
-        let materials = materials(&material, mesh.tets.len())?;
-        let supports = Supports::new(3 * mesh.nodes.len(), indices(&fixed))?;
-        Ok(Problem {
-            mesh,
-            materials,
-            supports,
-            surface_nodes: indices(&surface_nodes),
-            surface_faces: body::faces(&faces)?,
-            touch: indices(&touch),
-            loads: loads.as_array().to_vec(),
-        })
-    };
-    build().map_err(|e| to_python(arguments.py(), e))
+    let mesh = TetMesh::new(vectors(&nodes)?, body::tets(&tets)?)?;
+    let materials = materials(&material, mesh.tets.len())?;
+    let supports = Supports::new(3 * mesh.nodes.len(), indices(&fixed))?;
+    Ok(Problem {
+        mesh,
+        materials,
+        supports,
+        surface_nodes: indices(&surface_nodes),
+        surface_faces: body::faces(&faces)?,
+        touch: indices(&touch),
+        loads: loads.as_array().to_vec(),
+    })
 }
 
 fn interior(problem: &Problem) -> Result<palpate_core::green::Interior> {
@@ -75,14 +73,14 @@ pub(crate) fn forget_contacts(store: PathBuf) {
     contact::remove_compliance_files(&store);
 }
 
-/// The format of a name, if one is named.
-pub(crate) fn named(py: Python<'_>, name: Option<&str>) -> PyResult<Option<Precision>> {
-    name.map(|name| precision(py, name)).transpose()
+fn precision(name: &str) -> Result<Precision> {
+    let unknown = || Error::Invalid(format!("unknown precision '{name}': use 'f16', 'f32' or 'f64'"));
+    Precision::parse(name).ok_or_else(unknown)
 }
 
-fn precision(py: Python<'_>, name: &str) -> PyResult<Precision> {
-    Precision::parse(name)
-        .ok_or_else(|| to_python(py, Error::Invalid(format!("unknown precision '{name}': use 'f16', 'f32' or 'f64'"))))
+/// The format of a name; without one the cheapest whose typical contacts are right to `within`.
+pub(crate) fn requested(name: Option<&str>, within: f64) -> Result<RequestedPrecision> {
+    name.map_or(Ok(RequestedPrecision::Within(within)), |name| precision(name).map(RequestedPrecision::Named))
 }
 
 /// Displacements inside a body from those of its surface.
@@ -95,16 +93,16 @@ pub struct Interior {
 impl Interior {
     /// Factorises the inner part of the stiffness of a problem.
     #[new]
-    fn new(py: Python<'_>, arguments: &Bound<'_, PyTuple>) -> PyResult<Self> {
+    fn new(py: Python<'_>, arguments: &Bound<'_, PyTuple>) -> Answer<Self> {
         let problem = problem(arguments)?;
-        let interior = py.detach(|| interior(&problem)).map_err(|e| to_python(py, e))?;
+        let interior = py.detach(|| interior(&problem))?;
         Ok(Self { interior: Arc::new(interior) })
     }
 
     /// Displacements (3n) of all nodes, m, for those (3s) of the surface nodes.
-    fn extend<'py>(&self, py: Python<'py>, surface: PyReadonlyArray1<'py, f64>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    fn extend<'py>(&self, py: Python<'py>, surface: PyReadonlyArray1<'py, f64>) -> Answer<Bound<'py, PyArray1<f64>>> {
         let surface = surface.as_slice()?;
-        let all = py.detach(|| self.interior.extend(surface)).map_err(|e| to_python(py, e))?;
+        let all = py.detach(|| self.interior.extend(surface))?;
         Ok(all.into_pyarray(py))
     }
 }
@@ -114,9 +112,9 @@ impl GreenCore {
     /// Content key of the Green's function of a problem; without a name of that whose format the body chooses.
     #[staticmethod]
     #[pyo3(signature = (arguments, precision_name=None))]
-    fn content_key(py: Python<'_>, arguments: &Bound<'_, PyTuple>, precision_name: Option<&str>) -> PyResult<String> {
+    fn content_key(py: Python<'_>, arguments: &Bound<'_, PyTuple>, precision_name: Option<&str>) -> Answer<String> {
         let problem = problem(arguments)?;
-        let precision = named(py, precision_name)?;
+        let precision = precision_name.map(precision).transpose()?;
         Ok(py.detach(|| problem.key(precision)))
     }
 
@@ -128,9 +126,9 @@ impl GreenCore {
         precision_name: &str,
         description: String,
         progress: Option<Py<PyAny>>,
-    ) -> PyResult<Self> {
+    ) -> Answer<Self> {
         let problem = problem(arguments)?;
-        let precision = precision(py, precision_name)?;
+        let precision = precision(precision_name)?;
         let total = 3 * problem.touch.len();
         crate::allocator::return_large_blocks();
         let compute = |note: Progress<'_>| {
@@ -164,10 +162,9 @@ impl GreenCore {
         growth: Option<(PyReadonlyArray1<'_, u32>, Py<PyAny>, Py<PyAny>)>,
         phase: Option<Py<PyAny>>,
         claim: Option<&StoreClaim>,
-    ) -> PyResult<(usize, bool)> {
+    ) -> Answer<(usize, bool)> {
         let problem = problem(arguments)?;
-        let precision =
-            named(py, precision_name)?.map_or(RequestedPrecision::Within(within), RequestedPrecision::Named);
+        let precision = requested(precision_name, within)?;
         let total = 3 * problem.touch.len();
         let phase = |begun: Phase| {
             crate::allocator::return_free_pages();
@@ -176,18 +173,17 @@ impl GreenCore {
                 drop(Python::attach(|py| phase.call1(py, (begun.name(),))));
             }
         };
-        let claim = claimed(py, claim, path)?;
+        let claim = claimed(claim, path)?;
         let target = Target { precision, memory, description, phase: &phase };
         let (first, next, ready) = match growth {
             Some((first, next, ready)) => (indices(&first), Some(next), Some(ready)),
             None => (Vec::new(), None, None),
         };
         let (asked, written) = (Mutex::new(Vec::new()), AtomicUsize::new(0));
-        let lock = || asked.lock().unwrap_or_else(PoisonError::into_inner);
         let mut meanwhile = || -> PyResult<()> {
             if let Some(next) = &next {
                 let nodes: Option<Vec<u32>> = next.call0(py)?.extract(py)?;
-                lock().extend(nodes.unwrap_or_default());
+                locked(&asked).extend(nodes.unwrap_or_default());
             }
             match (written.swap(0, Ordering::Relaxed), &ready) {
                 (0, _) | (_, None) => Ok(()),
@@ -197,7 +193,7 @@ impl GreenCore {
         crate::allocator::return_large_blocks();
         let found = run_interruptible_and(py, total, progress.as_ref(), &mut meanwhile, |note| {
             require_scratch_of_products()?;
-            let next = || Some(std::mem::take(&mut *lock())).filter(|nodes| !nodes.is_empty());
+            let next = || Some(std::mem::take(&mut *locked(&asked))).filter(|nodes| !nodes.is_empty());
             let ready = |nodes| written.store(nodes, Ordering::Relaxed);
             let growth = Growth { first: &first, next: &next, ready: &ready };
             let mut found = PreviousWork::default();
@@ -215,29 +211,29 @@ impl GreenCore {
         arguments: &Bound<'py, PyTuple>,
         precision_name: Option<&str>,
         memory: Option<usize>,
-    ) -> PyResult<Bound<'py, PyDict>> {
+    ) -> Answer<Bound<'py, PyDict>> {
         let problem = problem(arguments)?;
-        let precision = named(py, precision_name)?;
-        let counts = py.detach(|| plan(&problem, precision, memory)).map_err(|e| to_python(py, e))?;
-        plan_dict(py, &counts)
+        let precision = precision_name.map(precision).transpose()?;
+        let counts = py.detach(|| plan(&problem, precision, memory))?;
+        Ok(plan_dict(py, &counts)?)
     }
 
     /// Writes the store, beside and then renamed.
-    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        py.detach(|| self.green.save(&path)).map_err(|e| to_python(py, e))
+    fn save(&self, py: Python<'_>, path: PathBuf) -> Answer<()> {
+        Ok(py.detach(|| self.green.save(&path))?)
     }
 
     /// A store of what contacts and pictures read, for a page that fetches it: see `GreensFunction::packed`.
-    fn packed<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        let bytes = py.detach(|| self.green.packed()).map_err(|e| to_python(py, e))?;
+    fn packed<'py>(&self, py: Python<'py>) -> Answer<Bound<'py, PyBytes>> {
+        let bytes = py.detach(|| self.green.packed())?;
         Ok(PyBytes::new(py, &bytes))
     }
 
     /// Reads and verifies a store.
     #[staticmethod]
     #[pyo3(signature = (path, expected_key=None))]
-    fn load(py: Python<'_>, path: PathBuf, expected_key: Option<String>) -> PyResult<Self> {
-        let green = py.detach(|| GreensFunction::load(&path, expected_key.as_deref())).map_err(|e| to_python(py, e))?;
+    fn load(py: Python<'_>, path: PathBuf, expected_key: Option<String>) -> Answer<Self> {
+        let green = py.detach(|| GreensFunction::load(&path, expected_key.as_deref()))?;
         Ok(Self { green: Arc::new(green) })
     }
 
@@ -250,7 +246,7 @@ impl GreenCore {
         forces: BTreeMap<usize, f64>,
         displacements: BTreeMap<usize, f64>,
         released: BTreeSet<usize>,
-    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, f64)> {
+    ) -> Answer<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, f64)> {
         let green = &self.green;
         let solve = || {
             let (known, switched) = Change { forces, displacements, released }.sorted(green).map_err(|column| {
@@ -260,23 +256,23 @@ impl GreenCore {
             require_scratch_of_products()?;
             capacitance::solve(green, &known, &switched)
         };
-        let answer = py.detach(solve).map_err(|e| to_python(py, e))?;
+        let answer = py.detach(solve)?;
         let (u, f) = (answer.displacements.into_pyarray(py), answer.forces.into_pyarray(py));
         Ok((u, f, answer.reactions.into_pyarray(py), answer.error))
     }
 
     /// Young's modulus (s), Pa, and Poisson's ratio (s) at the surface nodes, and whether all of the body is of one material;
     /// `None` of a store that does not say it.
-    fn surface_moduli<'py>(&self, py: Python<'py>) -> PyResult<Option<SurfaceModuli<'py>>> {
-        let known = palpate_scene::moduli_of_store(&self.green).map_err(|e| to_python(py, e))?;
+    fn surface_moduli<'py>(&self, py: Python<'py>) -> Answer<Option<SurfaceModuli<'py>>> {
+        let known = palpate_scene::moduli_of_store(&self.green)?;
         Ok(known.map(|m| (m.youngs.into_pyarray(py), m.poissons.into_pyarray(py), m.homogeneous)))
     }
 
     /// Shortest of `repeats` times of a plain copy of the entries between touchable nodes (ranks), us: what benchmarks of the
     /// force loop compare with.
-    fn gather_us(&self, py: Python<'_>, nodes: Vec<u32>, repeats: usize) -> PyResult<f64> {
+    fn gather_us(&self, py: Python<'_>, nodes: Vec<u32>, repeats: usize) -> Answer<f64> {
         let columns: Option<Vec<_>> = nodes.iter().map(|&node| self.green.touchable(node as usize)).collect();
-        let untouchable = || to_python(py, Error::Invalid("a node is not touchable".into()));
+        let untouchable = || Error::Invalid("a node is not touchable".into());
         let columns = columns.ok_or_else(untouchable)?;
         let mut entries = vec![0.0; 9 * nodes.len() * nodes.len()];
         let mut time = || {
@@ -294,10 +290,8 @@ impl GreenCore {
         point: [f64; 3],
         displacement: [Option<f64>; 3],
         radius: f64,
-    ) -> PyResult<([f64; 3], Bound<'py, PyArray1<f64>>, f64)> {
-        let touch = py
-            .detach(|| contact::touch(&self.green, DVec3::from(point), displacement, radius))
-            .map_err(|e| to_python(py, e))?;
+    ) -> Answer<([f64; 3], Bound<'py, PyArray1<f64>>, f64)> {
+        let touch = py.detach(|| contact::touch(&self.green, DVec3::from(point), displacement, radius))?;
         Ok((touch.force.to_array(), touch.displacements.into_pyarray(py), touch.error))
     }
 
@@ -316,7 +310,7 @@ impl GreenCore {
         if row < self.green.rows && column < 3 * self.green.touch.len() {
             Ok(self.green.entry(row, column))
         } else {
-            Err(pyo3::exceptions::PyIndexError::new_err("row or column out of range"))
+            Err(PyIndexError::new_err("row or column out of range"))
         }
     }
 
@@ -409,8 +403,8 @@ impl GreenCore {
 
 /// Multiplies matrices so many times on every thread, in single precision or in double; the operations that took.
 #[pyfunction]
-pub(crate) fn products(py: Python<'_>, single: bool, count: usize) -> PyResult<f64> {
-    require_scratch_of_products().map_err(|e| to_python(py, e))?;
+pub(crate) fn products(py: Python<'_>, single: bool, count: usize) -> Answer<f64> {
+    require_scratch_of_products()?;
     Ok(py.detach(|| palpate_core::green::products(single, count)))
 }
 

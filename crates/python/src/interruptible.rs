@@ -1,12 +1,13 @@
 //! Long computations on a thread, with progress reports and Ctrl-C.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use palpate_core::{Error, Result};
 use pyo3::prelude::*;
 
-use crate::errors::to_python;
+use crate::errors::Answer;
 
 /// Runs some long work on its own thread, while this one reports progress and listens for Ctrl-C. The work calls the
 /// function it is given with what is done and all there is to do, and stops when that returns false.
@@ -15,7 +16,7 @@ pub(crate) fn run_interruptible<T: Send>(
     total: usize,
     progress: Option<&Py<PyAny>>,
     work: impl FnOnce(&(dyn Fn(usize, usize) -> bool + Sync)) -> Result<T> + Send,
-) -> PyResult<T> {
+) -> Answer<T> {
     run_interruptible_and(py, total, progress, &mut || Ok(()), work)
 }
 
@@ -26,7 +27,7 @@ pub(crate) fn run_interruptible_and<T: Send>(
     progress: Option<&Py<PyAny>>,
     meanwhile: &mut dyn FnMut() -> PyResult<()>,
     work: impl FnOnce(&(dyn Fn(usize, usize) -> bool + Sync)) -> Result<T> + Send,
-) -> PyResult<T> {
+) -> Answer<T> {
     let (done, total) = (AtomicUsize::new(0), AtomicUsize::new(total));
     let stop = AtomicBool::new(false);
     let note = |finished: usize, all: usize| {
@@ -47,15 +48,34 @@ pub(crate) fn run_interruptible_and<T: Send>(
             if let Err(error) = py.check_signals().and_then(|()| report()).and_then(|()| meanwhile()) {
                 stop.store(true, Ordering::Relaxed);
                 let _ = py.detach(|| worker.join());
-                return Err(error);
+                return Err(error.into());
             }
         }
         match worker.join() {
-            Ok(Ok(value)) => meanwhile().map(|()| value),
-            Ok(Err(error)) => Err(to_python(py, error)),
-            Err(_) => Err(to_python(py, Error::Invalid("the precomputation failed unexpectedly".into()))),
+            Ok(done) => {
+                let value = done?;
+                meanwhile()?;
+                Ok(value)
+            }
+            Err(_) => Err(Error::Invalid("the precomputation failed unexpectedly".into()).into()),
         }
     })
+}
+
+/// What a mutex holds, whatever became of those who had it before.
+pub(crate) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Does some work on a pool of so many threads.
+pub(crate) fn on_threads<T: Send>(
+    py: Python<'_>,
+    threads: usize,
+    work: impl FnOnce() -> Result<T> + Send,
+) -> Answer<T> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = pool.map_err(|e| Error::Invalid(format!("no threads could be started: {e}")))?;
+    Ok(py.detach(|| pool.install(work))?)
 }
 
 /// Up to a tenth of a second, less when the worker ends.

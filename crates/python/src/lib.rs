@@ -26,7 +26,6 @@ mod sensor;
 mod series;
 mod simulation;
 mod strain;
-mod strain_law;
 mod surface;
 
 /// The module `palpate._native`.
@@ -74,13 +73,11 @@ mod _native {
     #[pymodule_export]
     use crate::sensor::SensorCore;
     #[pymodule_export]
-    use crate::series::{GatheredSeries, Series, SeriesBlocks, SeriesFile};
+    use crate::series::{GatheredSeries, Series, SeriesBlocks, SeriesFile, strain_terms};
     #[pymodule_export]
     use crate::simulation::SimulationCore;
     #[pymodule_export]
     use crate::strain::{StrainMeasure, StrainResponse, contact_patch, provisional_displacement};
-    #[pymodule_export]
-    use crate::strain_law::strain_terms;
     #[pymodule_export]
     use crate::surface::SurfaceSearch;
 

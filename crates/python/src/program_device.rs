@@ -2,10 +2,10 @@
 
 use palpate_devices::programmed::{ProgramEnd, ProgrammedDevice as Device, programmed};
 use palpate_devices::{Buttons, DeviceFault, Pose, ReadyDevice, Twist};
+use palpate_scene::unit_quaternion;
 use pyo3::prelude::*;
 
 use crate::connection::{LimitsArguments, OpenedDevice, limits_of};
-use crate::scene::quaternion;
 
 /// How far a quaternion's length may be from one.
 const UNIT_TOLERANCE: f64 = 1e-3;
@@ -43,7 +43,7 @@ impl ProgrammedDevice {
         buttons: u32,
     ) -> bool {
         let length = orientation.iter().map(|part| part * part).sum::<f64>().sqrt();
-        let pose = Pose { position: position.into(), orientation: quaternion(orientation) };
+        let pose = Pose { position: position.into(), orientation: unit_quaternion(orientation) };
         let twist = Twist { linear: velocity.into(), angular: angular_velocity.into() };
         let finite = pose.is_finite() && twist.linear.is_finite() && twist.angular.is_finite();
         if !finite || (length - 1.0).abs() > UNIT_TOLERANCE {

@@ -1,14 +1,12 @@
-//! Recordings written beside the loop, or in memory.
+//! Recordings written beside the loop.
 
 use std::collections::BTreeMap;
-use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
+use palpate_core::Result;
 use palpate_core::simulation::Model;
-use palpate_core::{Error, Result};
-use palpate_recording::{Header, TickWriter};
-use palpate_servo::TickRecord;
+use palpate_recording::Header;
 
 /// What is known before the first tick of a recording that begins now; of one without a clock at zero.
 pub fn header(about: BTreeMap<String, String>, model: &Model, rate: f64, clock: bool) -> Header {
@@ -52,48 +50,5 @@ impl Recording {
         let path = self.recorder.path().to_owned();
         let status = self.recorder.finish(ticks);
         (path, status.ticks, status.bytes, ticks.saturating_sub(status.ticks), status.error)
-    }
-}
-
-/// A recording in memory.
-pub struct Recorded {
-    writer: TickWriter<Cursor<Vec<u8>>>,
-    ticks: usize,
-    failed: Option<String>,
-}
-
-/// Ticks in a chunk of a file that nobody waits for.
-const CHUNK_TICKS: usize = 512;
-
-impl Recorded {
-    /// An empty one.
-    ///
-    /// # Errors
-    /// None that memory has.
-    pub fn new(header: Header) -> Result<Self> {
-        let writer =
-            TickWriter::new(Cursor::new(Vec::new()), header).map_err(|error| Error::Invalid(error.to_string()))?;
-        Ok(Self { writer, ticks: 0, failed: None })
-    }
-
-    /// One more tick.
-    pub fn push(&mut self, record: &TickRecord) {
-        self.ticks += 1;
-        let whole = self.ticks.is_multiple_of(CHUNK_TICKS);
-        let pushed = self.writer.push(record).and_then(|()| if whole { self.writer.flush() } else { Ok(()) });
-        self.failed = self.failed.take().or(pushed.err().map(|error| error.to_string()));
-    }
-
-    /// The file.
-    ///
-    /// # Errors
-    /// That of a tick, if one could not be written.
-    pub fn finish(self) -> Result<Vec<u8>> {
-        if let Some(reason) = self.failed {
-            return Err(Error::Invalid(reason));
-        }
-        let ticks = self.ticks as u64;
-        let file = self.writer.finish(Some(ticks)).map_err(|error| Error::Invalid(error.to_string()))?;
-        Ok(file.into_inner())
     }
 }

@@ -3,20 +3,21 @@
 use std::fs::File;
 use std::io::{BufReader, Cursor, Read};
 use std::path::PathBuf;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::Mutex;
 
 use numpy::{IntoPyArray, PyArray1};
 use palpate_core::simulation::{MAX_BODIES, Mode, Strike};
 use palpate_core::{Error, Result};
 use palpate_recording::{Ticks, same_settings};
-use palpate_scene::PreparedScene;
-use palpate_servo::{Owner, Settings, TickRecord};
+use palpate_scene::{PreparedScene, wxyz};
+use palpate_servo::{Settings, TickRecord};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::errors::to_python;
+use crate::errors::Answer;
 use crate::frame::{frame, push_row};
-use crate::scene::{energy_array, settings_dict, wxyz};
+use crate::interruptible::locked;
+use crate::scene::{energy_array, settings_dict};
 use crate::simulation::SimulationCore;
 
 /// Ticks between two looks for an interrupt.
@@ -159,24 +160,18 @@ impl Columns {
 
 /// Columns of a recording: what was recorded, numbers of the ticks and of their contacts, and how it ended.
 #[pyfunction]
-pub fn read_recording(py: Python<'_>, source: Source) -> PyResult<Bound<'_, PyDict>> {
-    let mut ticks = open(source).map_err(|e| to_python(py, e))?;
+pub fn read_recording(py: Python<'_>, source: Source) -> Answer<Bound<'_, PyDict>> {
+    let mut ticks = open(source)?;
     let tools = ticks.about.get("tools").and_then(|tools| tools.parse().ok()).unwrap_or(1);
     let mut columns = Columns::default();
-    loop {
-        let pushed = py.detach(|| -> Result<usize> {
-            let mut pushed = 0;
-            for record in ticks.by_ref().take(INTERRUPT_TICKS) {
-                columns.push(&record?, tools);
-                pushed += 1;
-            }
-            Ok(pushed)
-        });
-        py.check_signals()?;
-        if pushed.map_err(|e| to_python(py, e))? < INTERRUPT_TICKS {
-            break;
+    in_parts(py, usize::MAX, |count| {
+        let mut pushed = 0;
+        for record in ticks.by_ref().take(count) {
+            columns.push(&record?, tools);
+            pushed += 1;
         }
-    }
+        Ok(pushed)
+    })?;
     let answer = PyDict::new(py);
     answer.set_item("about", &ticks.about)?;
     answer.set_item("dropped", ticks.ending.map(|ending| ending.dropped))?;
@@ -192,11 +187,28 @@ pub fn read_recording(py: Python<'_>, source: Source) -> PyResult<Bound<'_, PyDi
     answer.set_item("compute_us", columns.compute_us.into_pyarray(py))?;
     answer.set_item("events", columns.events)?;
     let settings = columns.settings.iter().map(|settings| settings_from(py, settings, tools));
-    answer.set_item("settings", settings.collect::<PyResult<Vec<_>>>()?)?;
+    answer.set_item("settings", settings.collect::<Answer<Vec<_>>>()?)?;
     answer.set_item("contact_state", columns.contact_state.into_pyarray(py))?;
     answer.set_item("contact_numbers", columns.contact_numbers.into_pyarray(py))?;
     answer.set_item("bodies", columns.bodies.into_pyarray(py))?;
     Ok(answer)
+}
+
+/// Works through up to so many ticks in parts, with looks for an interrupt between them: `part` is given how many to make, and
+/// makes fewer where they end. How many there were.
+fn in_parts(py: Python<'_>, count: usize, mut part: impl FnMut(usize) -> Result<usize> + Send) -> Answer<usize> {
+    let mut done = 0;
+    while done < count {
+        let asked = INTERRUPT_TICKS.min(count - done);
+        let made = py.detach(|| part(asked));
+        py.check_signals()?;
+        let made = made?;
+        done += made;
+        if made < asked {
+            break;
+        }
+    }
+    Ok(done)
 }
 
 /// Settings from a tick on, with a stiffness scale for each body there could be, and the latest strike.
@@ -204,7 +216,7 @@ fn settings_from<'py>(
     py: Python<'py>,
     (tick, settings, strike): &(u64, Settings, Strike),
     tools: usize,
-) -> PyResult<Bound<'py, PyDict>> {
+) -> Answer<Bound<'py, PyDict>> {
     let answer = settings_dict(py, settings, tools, MAX_BODIES)?;
     answer.set_item("tick", tick)?;
     answer.set_item("strike_body", strike.body)?;
@@ -225,74 +237,50 @@ pub struct Replay {
     model: std::sync::Arc<palpate_core::simulation::Model>,
 }
 
-impl Replay {
-    fn lock(&self) -> MutexGuard<'_, (RecordedTicks, palpate_servo::Replay)> {
-        self.parts.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
 #[pymethods]
 impl Replay {
     /// Of a recording, with the simulation that it was made with.
     #[new]
-    fn new(py: Python<'_>, core: &SimulationCore, source: Source) -> PyResult<Self> {
-        let ticks = open(source).map_err(|e| to_python(py, e))?;
+    fn new(py: Python<'_>, core: &SimulationCore, source: Source) -> Answer<Self> {
+        let ticks = open(source)?;
         let PreparedScene { model, limits, settings, strain, devices, .. } = core.prepared(py);
-        let replay = palpate_servo::Replay::new(&model, &devices, limits, settings, strain);
-        let replay = replay.map_err(|e| to_python(py, e))?;
+        let replay = palpate_servo::Replay::new(&model, &devices, limits, settings, strain)?;
         Ok(Self { parts: Mutex::new((ticks, replay)), model })
     }
 
     /// Makes up to so many ticks again: how many there were, and what is not as recorded.
-    fn step(&self, py: Python<'_>, count: usize) -> PyResult<(usize, Vec<DifferenceRecord>)> {
-        let (mut done, mut differences) = (0, Vec::new());
-        while done < count {
-            let ticks = INTERRUPT_TICKS.min(count - done);
-            let now = py.detach(|| -> Result<usize> {
-                let mut parts = self.lock();
-                let (recorded, replay) = &mut *parts;
-                let mut now = 0;
-                for record in recorded.take(ticks) {
-                    differences.extend(replay.tick(&record?)?);
-                    now += 1;
-                }
-                Ok(now)
-            });
-            py.check_signals()?;
-            let now = now.map_err(|e| to_python(py, e))?;
-            done += now;
-            if now < ticks {
-                break;
+    fn step(&self, py: Python<'_>, count: usize) -> Answer<(usize, Vec<DifferenceRecord>)> {
+        let mut differences = Vec::new();
+        let done = in_parts(py, count, |count| {
+            let mut parts = locked(&self.parts);
+            let (recorded, replay) = &mut *parts;
+            let mut made = 0;
+            for record in recorded.take(count) {
+                differences.extend(replay.tick(&record?)?);
+                made += 1;
             }
-        }
-        let owner = |of| match of {
-            Owner::Scene => String::new(),
-            Owner::Tool(tool) => format!("tool {tool}"),
-            Owner::Body(body) => format!("body {body}"),
-        };
-        let record = |d: palpate_servo::Difference| (d.tick, owner(d.of), d.quantity, d.recorded, d.replayed);
+            Ok(made)
+        })?;
+        let record = |d: palpate_servo::Difference| (d.tick, d.of.to_string(), d.quantity, d.recorded, d.replayed);
         Ok((done, differences.into_iter().map(record).collect()))
     }
 
     /// What the longest tick so far took of the thread's own time, us.
     #[getter]
     fn longest_us(&self) -> f64 {
-        1e-3 * self.lock().1.longest_ns() as f64
+        1e-3 * locked(&self.parts).1.longest_ns() as f64
     }
 
     /// The latest tick made again, as a dictionary.
-    fn frame<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let published = {
-            let mut parts = self.lock();
-            parts.1.latest().clone()
-        };
+    fn frame<'py>(&self, py: Python<'py>) -> Answer<Bound<'py, PyDict>> {
+        let published = locked(&self.parts).1.latest().clone();
         frame(py, &self.model, published)
     }
 
     /// Rows of the log since the last call, as of a running loop; their computing times are not those of the recording.
     fn drain_log<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let mut rows = Vec::new();
-        let mut parts = self.lock();
+        let mut parts = locked(&self.parts);
         let replay = &mut parts.1;
         let body = replay.latest().status.settings.watch.map_or(0, |(body, _)| body).min(MAX_BODIES - 1);
         replay.drain_log(|row| push_row(&mut rows, &row, body));
@@ -300,8 +288,8 @@ impl Replay {
     }
 
     /// Settings of the latest tick, and the body and rank of the node that was watched.
-    fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let mut parts = self.lock();
+    fn settings<'py>(&self, py: Python<'py>) -> Answer<Bound<'py, PyDict>> {
+        let mut parts = locked(&self.parts);
         let settings = parts.1.latest().status.settings;
         let answer = settings_dict(py, &settings, self.model.tools.len(), self.model.bodies.len())?;
         answer.set_item("watched", settings.watch)?;

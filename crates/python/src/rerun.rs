@@ -3,13 +3,14 @@
 use std::collections::BTreeMap;
 
 use palpate_core::{Error, Result};
+use palpate_recording::RecordingInMemory;
 use palpate_scene::PreparedScene;
 use palpate_servo::{RecordedInput, Settings, TickRecord};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-use crate::errors::to_python;
-use crate::recording::{Recorded, header};
+use crate::errors::Answer;
+use crate::recording::header;
 use crate::replay::{INTERRUPT_TICKS, Source, open};
 use crate::simulation::SimulationCore;
 
@@ -22,12 +23,11 @@ pub fn rerun<'py>(
     source: Source,
     about: BTreeMap<String, String>,
     progress: Option<Py<PyAny>>,
-) -> PyResult<Bound<'py, PyBytes>> {
-    let ticks = open(source).map_err(|e| to_python(py, e))?;
+) -> Answer<Bound<'py, PyBytes>> {
+    let ticks = open(source)?;
     let PreparedScene { model, limits, settings, strain, devices, scheduling, .. } = core.prepared(py);
     let settings = Settings { watch: None, ..settings };
-    let header = header(about, &model, scheduling.rate, false);
-    let mut file = Recorded::new(header).map_err(|e| to_python(py, e))?;
+    let mut file = RecordingInMemory::new(header(about, &model, scheduling.rate, false))?;
     let mut stopped = None;
     let inputs = ticks.enumerate().map_while(|(rank, record)| match record {
         Ok(record) if record.tick != rank as u64 => None,
@@ -48,10 +48,10 @@ pub fn rerun<'py>(
     let each = |record: &TickRecord| file.push(record);
     let result = py.detach(|| palpate_servo::rerun(&model, &devices, limits, settings, &strain, inputs, each));
     if let Some(error) = stopped {
-        return Err(error);
+        return Err(error.into());
     }
-    result.map_err(|e| to_python(py, e))?;
-    let bytes = file.finish().map_err(|e| to_python(py, e))?;
+    result?;
+    let bytes = file.finish()?;
     Ok(PyBytes::new(py, &bytes))
 }
 

@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use glam::DQuat;
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use palpate_core::contact::Moduli;
 use palpate_core::contact::shape::ToolShape;
@@ -11,14 +10,13 @@ use palpate_core::dynamics::Energy;
 use palpate_core::simulation::{Contact, KnownSeries, LawKind, Mode, Model, Pose, Snapshot};
 use palpate_core::{Error, Result};
 use palpate_devices::DeviceLimits;
-pub use palpate_scene::unit_quaternion as quaternion;
-use palpate_scene::{Body, Motion, Tool, placement};
+use palpate_scene::{Body, Motion, Tool, device_pose, placement};
 use palpate_servo::{Per, Setting, Settings};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::dynamics::{SchemeArguments, scheme};
-use crate::errors::to_python;
+use crate::errors::Answer;
 use crate::green::GreenCore;
 use crate::series::Series;
 
@@ -51,19 +49,19 @@ pub type ContactRecord =
     (usize, usize, &'static str, [[f64; 3]; 6], [bool; 2], [f64; 4], Vec<u32>, Vec<f64>, [[f64; 3]; 2]);
 
 /// Takes arguments out of the interpreter's hands.
-pub fn scene_body(arguments: &BodyArguments<'_>) -> PyResult<Body> {
+pub fn scene_body(arguments: &BodyArguments<'_>) -> Answer<Body> {
     let (green, position, orientation, dynamics, moduli, series) = arguments;
     let motion = dynamics
         .as_ref()
-        .map(|(eigenvalues, shapes, arguments, exact, coupling)| -> PyResult<_> {
-            let (newmark, rayleigh) = scheme(*arguments).map_err(|e| to_python(green.py(), e))?;
+        .map(|(eigenvalues, shapes, arguments, exact, coupling)| -> Answer<_> {
+            let (newmark, rayleigh) = scheme(*arguments)?;
             let (eigenvalues, shapes) = (eigenvalues.as_slice()?.to_vec(), shapes.as_slice()?.to_vec());
             Ok(Motion { eigenvalues, shapes, newmark, rayleigh, exact: *exact, coupling: *coupling })
         })
         .transpose()?;
     let moduli = moduli
         .as_ref()
-        .map(|(youngs, poissons, terms, homogeneous)| -> PyResult<_> {
+        .map(|(youngs, poissons, terms, homogeneous)| -> Answer<_> {
             let linear = Moduli::linear(youngs.as_slice()?.to_vec(), poissons.as_slice()?.to_vec(), *homogeneous);
             let Some(terms) = terms else { return Ok(linear) };
             Ok(Moduli { strain_terms: terms.as_slice()?.as_chunks().0.to_vec(), ..linear })
@@ -111,7 +109,7 @@ pub fn settings_dict<'py>(
     settings: &Settings,
     tools: usize,
     bodies: usize,
-) -> PyResult<Bound<'py, PyDict>> {
+) -> Answer<Bound<'py, PyDict>> {
     let answer = PyDict::new(py);
     for setting in &Setting::ALL {
         let values = setting.values(settings);
@@ -124,26 +122,10 @@ pub fn settings_dict<'py>(
     Ok(answer)
 }
 
-/// As w x y z.
-pub fn wxyz(q: DQuat) -> [f64; 4] {
-    [q.w, q.x, q.y, q.z]
-}
-
-/// Poses of (ticks, tools, 3) positions and (ticks, tools, 4) orientations. A tool that is out of the scene keeps its
-/// position that is not finite.
+/// Poses of (ticks, tools, 3) positions and (ticks, tools, 4) orientations.
 pub fn poses(positions: &[f64], orientations: &[f64]) -> Vec<Pose> {
     let (positions, orientations) = (positions.as_chunks::<3>().0, orientations.as_chunks::<4>().0);
-    positions
-        .iter()
-        .zip(orientations)
-        .map(|(&position, &orientation)| Pose {
-            position: position.into(),
-            orientation: match position.iter().all(|x| x.is_finite()) {
-                true => quaternion(orientation),
-                false => DQuat::IDENTITY,
-            },
-        })
-        .collect()
+    positions.iter().zip(orientations).map(|(&position, &orientation)| device_pose(position, orientation)).collect()
 }
 
 /// Kinetic, strain, coupling, dissipated, work; J.

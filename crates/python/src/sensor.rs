@@ -1,18 +1,18 @@
 //! Copies of a scene that are stepped together by poses given: contact as a sensor of a robot simulator.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::Mutex;
 
 use numpy::{IntoPyArray, PyReadonlyArray3, PyUntypedArrayMethods};
-use palpate_core::simulation::{Model, Pose, TaxelGrid};
+use palpate_core::simulation::{Model, TaxelGrid};
 use palpate_core::{Error, Result};
-use palpate_scene::PreparedScene;
+use palpate_scene::{PreparedScene, device_pose};
 use palpate_servo::{Settings, Stepper};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
 
-use crate::errors::to_python;
-use crate::scene::quaternion;
+use crate::errors::Answer;
+use crate::interruptible::locked;
 use crate::simulation::SimulationCore;
 
 /// Numbers of a pose (position and orientation w x y z) and of a wrench (force and torque).
@@ -55,7 +55,7 @@ impl SensorCore {
         count: usize,
         limited: bool,
         taxels: Option<(usize, usize, Vec<[f64; 2]>)>,
-    ) -> PyResult<Self> {
+    ) -> Answer<Self> {
         let PreparedScene { model, limits, settings, strain, devices, .. } = core.prepared(py);
         let settings = Settings { watch: None, ..settings };
         let copy = |_| -> Result<_> {
@@ -63,8 +63,7 @@ impl SensorCore {
             let (wrenches, contacts, pressures) = (Vec::new(), Vec::new(), Vec::new());
             Ok(Copy { stepper, model: model.clone(), wrenches, contacts, pressures, fault: None })
         };
-        let copies = py.detach(|| (0..count).map(copy).collect::<Result<Vec<_>>>());
-        let copies = Mutex::new(copies.map_err(|e| to_python(py, e))?);
+        let copies = Mutex::new(py.detach(|| (0..count).map(copy).collect::<Result<Vec<_>>>())?);
         let of_tool = |(rows, columns, sides): (usize, usize, Vec<[f64; 2]>)| {
             sides.into_iter().map(|sides| TaxelGrid { rows, columns, sides }).collect()
         };
@@ -74,37 +73,30 @@ impl SensorCore {
 
     /// A tick of all copies, with poses (copies, tools, 7), NaN for a tool that is out of the scene, a time `period` (s) after the last:
     /// wrenches on the tools (copies * tools * 6), contacts, pressures, and faults by copy.
-    fn step<'py>(
-        &self,
-        py: Python<'py>,
-        poses: PyReadonlyArray3<'py, f64>,
-        period: f64,
-    ) -> PyResult<Bound<'py, PyDict>> {
+    fn step<'py>(&self, py: Python<'py>, poses: PyReadonlyArray3<'py, f64>, period: f64) -> Answer<Bound<'py, PyDict>> {
         let (shape, poses) = (poses.shape().to_vec(), poses.as_slice()?.to_vec());
-        let (wrenches, contacts, pressures, faults) = py
-            .detach(|| {
-                let mut copies = self.lock();
-                if shape != [copies.len(), self.tools, POSE] {
-                    return Err(Error::Invalid(format!("poses have the shape {shape:?}")));
-                }
-                let numbers = self.tools * POSE;
+        let (wrenches, contacts, pressures, faults) = py.detach(|| {
+            let mut copies = locked(&self.copies);
+            if shape != [copies.len(), self.tools, POSE] {
+                return Err(Error::Invalid(format!("poses have the shape {shape:?}")));
+            }
+            let numbers = self.tools * POSE;
+            copies
+                .par_iter_mut()
+                .zip(poses.par_chunks_exact(numbers))
+                .enumerate()
+                .for_each(|(rank, (copy, poses))| copy.step(self, rank, poses, period));
+            Ok((
+                copies.iter().flat_map(|copy| copy.wrenches.iter().copied()).collect::<Vec<_>>(),
+                copies.iter().flat_map(|copy| copy.contacts.iter().flatten().copied()).collect::<Vec<_>>(),
+                copies.iter().flat_map(|copy| copy.pressures.iter().copied()).collect::<Vec<_>>(),
                 copies
-                    .par_iter_mut()
-                    .zip(poses.par_chunks_exact(numbers))
+                    .iter()
                     .enumerate()
-                    .for_each(|(rank, (copy, poses))| copy.step(self, rank, poses, period));
-                Ok((
-                    copies.iter().flat_map(|copy| copy.wrenches.iter().copied()).collect::<Vec<_>>(),
-                    copies.iter().flat_map(|copy| copy.contacts.iter().flatten().copied()).collect::<Vec<_>>(),
-                    copies.iter().flat_map(|copy| copy.pressures.iter().copied()).collect::<Vec<_>>(),
-                    copies
-                        .iter()
-                        .enumerate()
-                        .filter_map(|(rank, copy)| Some((rank, copy.fault.clone()?)))
-                        .collect::<Vec<_>>(),
-                ))
-            })
-            .map_err(|e| to_python(py, e))?;
+                    .filter_map(|(rank, copy)| Some((rank, copy.fault.clone()?)))
+                    .collect::<Vec<_>>(),
+            ))
+        })?;
         let answer = PyDict::new(py);
         answer.set_item("wrenches", wrenches.into_pyarray(py))?;
         answer.set_item("contacts", contacts.into_pyarray(py))?;
@@ -114,30 +106,19 @@ impl SensorCore {
     }
 
     /// Begins some copies anew in their next tick: without contacts, bodies at rest, faults cleared.
-    fn reset(&self, py: Python<'_>, copies: Vec<usize>) -> PyResult<()> {
-        let mut all = self.lock();
-        let chosen = copies.into_iter().try_for_each(|rank| match all.get_mut(rank) {
-            Some(copy) => copy.stepper.reset(),
-            None => Err(Error::Invalid(format!("there is no copy {rank}"))),
-        });
-        chosen.map_err(|e| to_python(py, e))
-    }
-}
-
-impl SensorCore {
-    fn lock(&self) -> MutexGuard<'_, Vec<Copy>> {
-        self.copies.lock().unwrap_or_else(PoisonError::into_inner)
+    fn reset(&self, copies: Vec<usize>) -> Answer<()> {
+        let mut all = locked(&self.copies);
+        for rank in copies {
+            let missing = || Error::Invalid(format!("there is no copy {rank}"));
+            all.get_mut(rank).ok_or_else(missing)?.stepper.reset()?;
+        }
+        Ok(())
     }
 }
 
 impl Copy {
     fn step(&mut self, sensor: &SensorCore, rank: usize, poses: &[f64], period: f64) {
-        let pose = |numbers: &[f64; POSE]| {
-            let [x, y, z, orientation @ ..] = *numbers;
-            let finite = [x, y, z].iter().all(|number| number.is_finite());
-            let orientation = if finite { quaternion(orientation) } else { glam::DQuat::IDENTITY };
-            Pose { position: [x, y, z].into(), orientation }
-        };
+        let pose = |&[x, y, z, orientation @ ..]: &[f64; POSE]| device_pose([x, y, z], orientation);
         let poses: Vec<_> = poses.as_chunks::<POSE>().0.iter().map(pose).collect();
         self.stepper.step(&poses, &[], period);
         self.wrenches.clear();

@@ -1,26 +1,44 @@
 //! Taylor series of bodies beyond small strain.
 
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use glam::DVec3;
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use palpate_core::Error;
 use palpate_core::contact::SeriesFields;
-use palpate_core::contact::local::{SERIES_FIELDS, StrainLaw};
+use palpate_core::contact::local::{self, SERIES_FIELDS, StrainLaw};
 use palpate_core::green::checksum;
 use palpate_core::series::{self, HyperelasticBody, SeriesPlan};
 use palpate_core::simulation::KnownSeries;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyTuple};
 
-use crate::errors::to_python;
+use crate::errors::Answer;
 use crate::green::problem;
-use crate::interruptible::run_interruptible;
-use crate::strain_law::strain_law;
+use crate::interruptible::{locked, on_threads, run_interruptible};
 
 /// Laws by name and ratios (k), and the law of each element (m).
 pub type LawArguments<'py> = (Vec<(String, f64, f64)>, PyReadonlyArray1<'py, u32>);
+
+/// A law by its name and two ratios of its constants.
+fn strain_law(name: &str, first: f64, second: f64) -> Option<StrainLaw> {
+    Some(match name {
+        "linear" => StrainLaw::Linear,
+        "neo-hookean" => StrainLaw::NeoHookean,
+        "mooney-rivlin" => StrainLaw::MooneyRivlin { share: first },
+        "yeoh" => StrainLaw::Yeoh { quadratic: first, cubic: second },
+        _ => return None,
+    })
+}
+
+/// Coefficients of a sphere's contact at finite strain of a material, by its law, two ratios of its constants and Poisson's ratio;
+/// `None` outside of the table.
+#[pyfunction]
+pub fn strain_terms(law: &str, first: f64, second: f64, poisson: f64) -> Option<[f64; 3]> {
+    let law = strain_law(law, first, second)?;
+    law.is_known(poisson).then(|| local::strain_terms(&law, poisson))
+}
 
 fn laws((known, of_element): &LawArguments<'_>) -> palpate_core::Result<Vec<StrainLaw>> {
     let unknown = |name: &str| Error::Invalid(format!("there is no law '{name}'"));
@@ -49,9 +67,8 @@ impl Series {
 impl Series {
     /// Reads any file of series, of whatever body.
     #[staticmethod]
-    fn read(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        let read = py.detach(|| series::SeriesFile::read(&path));
-        read.map(|series| Self { series }).map_err(|e| to_python(py, e))
+    fn read(py: Python<'_>, path: PathBuf) -> Answer<Self> {
+        Ok(Self { series: py.detach(|| series::SeriesFile::read(&path))? })
     }
 
     /// Coefficients (fans, 9) at the smooth sides of the surface nodes; zero where they are not known.
@@ -113,14 +130,8 @@ pub struct SeriesFile {
 impl SeriesFile {
     /// Beside the store of a body with such a key, for spheres of a radius, m.
     #[new]
-    fn new(
-        py: Python<'_>,
-        law_arguments: LawArguments<'_>,
-        radius: f64,
-        store: PathBuf,
-        green_key: &str,
-    ) -> PyResult<Self> {
-        let laws = laws(&law_arguments).map_err(|e| to_python(py, e))?;
+    fn new(law_arguments: LawArguments<'_>, radius: f64, store: PathBuf, green_key: &str) -> Answer<Self> {
+        let laws = laws(&law_arguments)?;
         let file = series::SeriesFile::beside(&store, green_key, &laws, radius);
         Ok(Self { file: Arc::new(file), laws: laws.into(), radius, near: Mutex::new(None) })
     }
@@ -133,7 +144,7 @@ impl SeriesFile {
 
     /// Has the places near a point, m, be computed first from now on.
     fn set_near(&self, point: [f64; 3]) {
-        *self.near.lock().unwrap_or_else(PoisonError::into_inner) = Some(point.into());
+        *locked(&self.near) = Some(point.into());
     }
 
     /// What is stored, complete or not; `None` for a file that is missing, damaged or of another body.
@@ -143,9 +154,9 @@ impl SeriesFile {
 
     /// Computes and stores what is not stored yet; `progress` is called with the known places and all of them.
     #[pyo3(signature = (arguments, progress=None))]
-    fn compute(&self, py: Python<'_>, arguments: &Bound<'_, PyTuple>, progress: Option<Py<PyAny>>) -> PyResult<Series> {
+    fn compute(&self, py: Python<'_>, arguments: &Bound<'_, PyTuple>, progress: Option<Py<PyAny>>) -> Answer<Series> {
         let problem = Arc::new(problem(arguments)?);
-        let near = || *self.near.lock().unwrap_or_else(PoisonError::into_inner);
+        let near = || *locked(&self.near);
         let computed = run_interruptible(py, 0, progress.as_ref(), |note| {
             self.file.compute(&SeriesPlan::new(problem.clone(), self.laws.clone(), self.radius)?, &near, note)
         });
@@ -153,7 +164,7 @@ impl SeriesFile {
     }
 
     /// Places, those that are not stored yet, the points of quadrature at which each is summed, and the bytes of the whole file.
-    fn count(&self, py: Python<'_>, arguments: &Bound<'_, PyTuple>) -> PyResult<(usize, usize, usize, usize)> {
+    fn count(&self, py: Python<'_>, arguments: &Bound<'_, PyTuple>) -> Answer<(usize, usize, usize, usize)> {
         let plan = self.plan(py, arguments)?;
         let count = || {
             let layout = plan.layout();
@@ -164,7 +175,7 @@ impl SeriesFile {
     }
 
     /// What is stored, to be completed by blocks from elsewhere.
-    fn gathering(&self, py: Python<'_>, arguments: &Bound<'_, PyTuple>) -> PyResult<GatheredSeries> {
+    fn gathering(&self, py: Python<'_>, arguments: &Bound<'_, PyTuple>) -> Answer<GatheredSeries> {
         let plan = self.plan(py, arguments)?;
         let series = py.detach(|| self.file.resume(plan.layout()));
         Ok(GatheredSeries { file: self.file.clone(), series: Mutex::new(series) })
@@ -172,9 +183,9 @@ impl SeriesFile {
 }
 
 impl SeriesFile {
-    fn plan(&self, py: Python<'_>, arguments: &Bound<'_, PyTuple>) -> PyResult<SeriesPlan> {
+    fn plan(&self, py: Python<'_>, arguments: &Bound<'_, PyTuple>) -> Answer<SeriesPlan> {
         let problem = Arc::new(problem(arguments)?);
-        py.detach(|| SeriesPlan::new(problem, self.laws.clone(), self.radius)).map_err(|e| to_python(py, e))
+        Ok(py.detach(|| SeriesPlan::new(problem, self.laws.clone(), self.radius))?)
     }
 }
 
@@ -185,42 +196,36 @@ pub struct GatheredSeries {
     series: Mutex<series::Series>,
 }
 
-impl GatheredSeries {
-    fn held(&self) -> MutexGuard<'_, series::Series> {
-        self.series.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
 #[pymethods]
 impl GatheredSeries {
     /// Hash of the places in their order.
     #[getter]
     fn order<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
-        PyBytes::new(py, &self.held().layout.order())
+        PyBytes::new(py, &locked(&self.series).layout.order())
     }
 
     /// How many places are known.
     #[getter]
     fn done(&self) -> usize {
-        self.held().done()
+        locked(&self.series).done()
     }
 
     /// How many places there are.
     #[getter]
     fn places(&self) -> usize {
-        self.held().layout.places.len()
+        locked(&self.series).layout.places.len()
     }
 
     /// Blocks that are not known.
     fn missing(&self) -> Vec<usize> {
-        self.held().next(usize::MAX, None)
+        locked(&self.series).next(usize::MAX, None)
     }
 
     /// Adds the coefficients (k, 9) of a block, and stores all that is known if the file can be written; `false` for numbers of
     /// another block or with another checksum.
     fn put(&self, py: Python<'_>, block: usize, fields: &[u8], sum: &[u8]) -> bool {
         py.detach(|| {
-            let mut series = self.held();
+            let mut series = locked(&self.series);
             let size = size_of_val(series.block(block));
             if fields.len() != size || checksum(fields)[..] != *sum {
                 return false;
@@ -236,7 +241,7 @@ impl GatheredSeries {
 
     /// The series as far as it is known.
     fn known(&self) -> Series {
-        Series { series: self.held().clone() }
+        Series { series: locked(&self.series).clone() }
     }
 }
 
@@ -257,16 +262,13 @@ impl SeriesBlocks {
         law_arguments: LawArguments<'_>,
         radius: f64,
         threads: usize,
-    ) -> PyResult<Self> {
+    ) -> Answer<Self> {
         let problem = Arc::new(problem(arguments)?);
-        let laws = laws(&law_arguments).map_err(|e| to_python(py, e))?;
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        let pool = pool.map_err(|e| to_python(py, Error::Invalid(format!("no threads could be started: {e}"))))?;
-        let made = || {
+        let laws = laws(&law_arguments)?;
+        on_threads(py, threads, || {
             let plan = SeriesPlan::new(problem, laws.into(), radius)?;
             plan.factorize().map(|body| Self { plan, body })
-        };
-        py.detach(|| pool.install(made)).map_err(|e| to_python(py, e))
+        })
     }
 
     /// Hash of the places in their order.

@@ -8,19 +8,20 @@ use glam::DVec3;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use palpate_core::simulation::{MAX_BODIES, Strike};
 use palpate_devices::simulated::{Handle, Target};
-use palpate_scene::{BodyId, PreparedScene, Scene};
+use palpate_recording::RecordingInMemory;
+use palpate_scene::{BodyId, PreparedScene, Scene, unit_quaternion};
 use palpate_servo::{SafetyLimits, Scheduling, Script, Servo, Settings, TickRecord};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
 use pyo3::types::{PyBytes, PyDict};
 
 use crate::connection::{Connected, common_scheduler};
-use crate::errors::to_python;
+use crate::errors::Answer;
 use crate::frame::{frame, push_row};
-use crate::recording::{Recorded, Recording, RecordingStatus, header};
+use crate::recording::{Recording, RecordingStatus, header};
 use crate::scene::{
-    BodyArguments, ContactRecord, ToolArguments, contact_records, energy_array, poses, quaternion, scene_body,
-    scene_tool, settings_dict,
+    BodyArguments, ContactRecord, ToolArguments, contact_records, energy_array, poses, scene_body, scene_tool,
+    settings_dict,
 };
 
 /// Tick, body, point (m), impulse (N s) and duration (s) of a strike on a patch of the first tool's contact radius.
@@ -64,8 +65,8 @@ impl SimulationCore {
         limits: (f64, f64, f64),
         strain_limit: f64,
         scheduling: (f64, Vec<usize>, u8),
-    ) -> PyResult<Self> {
-        let bodies = bodies.iter().map(scene_body).collect::<PyResult<Vec<_>>>()?;
+    ) -> Answer<Self> {
+        let bodies = bodies.iter().map(scene_body).collect::<Answer<Vec<_>>>()?;
         let mut scene = Scene::default();
         scene.limits = SafetyLimits { max_force: limits.0, max_slew: limits.1, ramp: limits.2, ..scene.limits };
         scene.scheduling = Scheduling { rate: scheduling.0, cpus: scheduling.1, priority: scheduling.2 };
@@ -75,7 +76,7 @@ impl SimulationCore {
             tools.into_iter().try_for_each(|tool| scene.add_tool(scene_tool(tool)?).map(|_| ()))?;
             scene.prepare()
         };
-        let prepared = py.detach(prepare).map_err(|e| to_python(py, e))?;
+        let prepared = py.detach(prepare)?;
         let parts = RunningParts {
             connected: prepared.tools.iter().map(|_| None).collect(),
             handles: prepared.tools.iter().map(|_| None).collect(),
@@ -91,23 +92,23 @@ impl SimulationCore {
     }
 
     /// Starts the loop; whether the system granted its priority, and locked memory.
-    fn start(&self, py: Python<'_>) -> PyResult<(bool, bool)> {
+    fn start(&self, py: Python<'_>) -> Answer<(bool, bool)> {
         let _alone = self.changing(py);
         let mut parts = self.parts(py);
         let connected: Vec<_> = parts.connected.iter_mut().map(Option::take).collect();
         let devices = connected.into_iter().enumerate().map(|(tool, device)| parts.device_of(tool, device));
         let devices: Vec<_> = devices.collect();
-        let scheduler = common_scheduler(&devices, parts.prepared.scheduling.rate).map_err(|e| to_python(py, e))?;
+        let scheduler = common_scheduler(&devices, parts.prepared.scheduling.rate)?;
         let (handles, devices): (Vec<_>, Vec<_>) = devices.into_iter().map(|part| (part.handle, part.device)).unzip();
         parts.handles = handles;
         drop(parts);
         let PreparedScene { model, limits, settings, scheduling, strain, .. } = self.prepared(py);
         let start = || Servo::start(model, devices, limits, settings, scheduling, strain, scheduler);
-        let mut servo = py.detach(start).map_err(|e| to_python(py, e))?;
+        let mut servo = py.detach(start)?;
         let realtime = servo.realtime();
         let mut parts = self.parts(py);
         // Others may have changed them meanwhile.
-        servo.set(parts.prepared.settings).map_err(|e| to_python(py, e))?;
+        servo.set(parts.prepared.settings)?;
         parts.servo = Some(servo);
         Ok((realtime.priority, realtime.locked_memory))
     }
@@ -141,22 +142,22 @@ impl SimulationCore {
         let RunningParts { targets, handles, .. } = &mut *parts;
         let Some(target) = targets.get_mut(tool) else { return };
         place.0.into_iter().for_each(|position| target.pose.position = position.into());
-        place.1.into_iter().for_each(|turned| target.pose.orientation = quaternion(turned));
+        place.1.into_iter().for_each(|turned| target.pose.orientation = unit_quaternion(turned));
         (target.velocity, target.active, target.grab) = (velocity.into(), active, grab.unwrap_or(target.grab));
         handles[tool].iter_mut().for_each(|handle| handle.set(*target));
     }
 
     /// Changes a setting of a tool or a body, or of the scene (rank 0).
-    fn set(&self, py: Python<'_>, name: &str, rank: usize, value: f64) -> PyResult<()> {
+    fn set(&self, py: Python<'_>, name: &str, rank: usize, value: f64) -> Answer<()> {
         if name == "contact_radius" {
             let model = self.parts(py).prepared.model.clone();
-            py.detach(|| model.check_contact_radius(value)).map_err(|e| to_python(py, e))?;
+            py.detach(|| model.check_contact_radius(value))?;
         }
         self.change_settings(py, |settings| settings.set(name, rank, value))
     }
 
     /// The settings by their names: a number, or a list with one for each tool or body.
-    fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn settings<'py>(&self, py: Python<'py>) -> Answer<Bound<'py, PyDict>> {
         let PreparedScene { settings, tools, bodies, .. } = &self.parts(py).prepared;
         settings_dict(py, settings, tools.len(), bodies.len())
     }
@@ -168,7 +169,7 @@ impl SimulationCore {
         py: Python<'py>,
         body: usize,
         points: PyReadonlyArray2<'py, f64>,
-    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    ) -> Answer<Bound<'py, PyArray1<f64>>> {
         let points = points.as_slice()?.to_vec();
         let model = self.parts(py).prepared.model.clone();
         let feet = py.detach(|| {
@@ -185,23 +186,21 @@ impl SimulationCore {
     }
 
     /// Lets go of everything and clears faults.
-    fn reset(&self, py: Python<'_>) -> PyResult<()> {
-        let reset = self.parts(py).servo.as_mut().map_or(Ok(()), Servo::reset);
-        reset.map_err(|e| to_python(py, e))
+    fn reset(&self, py: Python<'_>) -> Answer<()> {
+        Ok(self.parts(py).servo.as_mut().map_or(Ok(()), Servo::reset)?)
     }
 
     /// Gives the surface point of a body closest to `point` (m) an impulse, N s, within a duration, s, on a patch of the
     /// contact radius of the first tool.
-    fn strike(&self, py: Python<'_>, body: usize, point: [f64; 3], impulse: [f64; 3], duration: f64) -> PyResult<()> {
+    fn strike(&self, py: Python<'_>, body: usize, point: [f64; 3], impulse: [f64; 3], duration: f64) -> Answer<()> {
         let mut parts = self.parts(py);
         let radius = parts.prepared.settings.contact_radius[0];
         let strike = Strike { body, point: point.into(), impulse: impulse.into(), radius, duration };
-        let struck = parts.servo.as_mut().map_or(Ok(()), |servo| servo.strike(strike));
-        struck.map_err(|e| to_python(py, e))
+        Ok(parts.servo.as_mut().map_or(Ok(()), |servo| servo.strike(strike))?)
     }
 
     /// A body and its surface node (rank) whose displacement is logged.
-    fn watch(&self, py: Python<'_>, body: usize, node: u32) -> PyResult<()> {
+    fn watch(&self, py: Python<'_>, body: usize, node: u32) -> Answer<()> {
         self.change_settings(py, |settings| {
             settings.watch = Some((body, node));
             Ok(())
@@ -209,7 +208,7 @@ impl SimulationCore {
     }
 
     /// The latest tick as a dictionary; None if the loop does not run. It is worked out after the tick has been taken.
-    fn frame<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+    fn frame<'py>(&self, py: Python<'py>) -> Answer<Option<Bound<'py, PyDict>>> {
         let (model, number, published) = {
             let mut parts = self.parts(py);
             let (model, number) = (parts.prepared.model.clone(), parts.number);
@@ -241,12 +240,11 @@ impl SimulationCore {
     }
 
     /// Has the running loop begin anew and records it in a new file, with what is known of it.
-    fn begin_recording(&self, py: Python<'_>, path: PathBuf, about: BTreeMap<String, String>) -> PyResult<()> {
+    fn begin_recording(&self, py: Python<'_>, path: PathBuf, about: BTreeMap<String, String>) -> Answer<()> {
         let mut parts = self.parts(py);
         let header = header(about, &parts.prepared.model, parts.prepared.scheduling.rate, true);
         let RunningParts { servo: Some(servo), recording, .. } = &mut *parts else { return Ok(()) };
-        let begun = py.detach(|| Recording::begin(&path, header, servo));
-        *recording = Some(begun.map_err(|e| to_python(py, e))?);
+        *recording = Some(py.detach(|| Recording::begin(&path, header, servo))?);
         Ok(())
     }
 
@@ -278,7 +276,7 @@ impl SimulationCore {
         grabs: PyReadonlyArray2<'py, bool>,
         extras: (Vec<StrikeArguments>, Vec<(usize, u32)>),
         about: Option<BTreeMap<String, String>>,
-    ) -> PyResult<Bound<'py, PyDict>> {
+    ) -> Answer<Bound<'py, PyDict>> {
         let poses = poses(positions.as_slice()?, orientations.as_slice()?);
         let grabs = grabs.as_slice()?.to_vec();
         let ticks = positions.shape()[0];
@@ -298,12 +296,11 @@ impl SimulationCore {
             watch: &watch,
             devices: &devices,
         };
-        let begin = |about| Recorded::new(header(about, &model, rate, false));
-        let mut file = about.map(begin).transpose().map_err(|e| to_python(py, e))?;
+        let begin = |about| RecordingInMemory::new(header(about, &model, rate, false));
+        let mut file = about.map(begin).transpose()?;
         let each = |record: &TickRecord| file.iter_mut().for_each(|file| file.push(record));
-        let recording = py.detach(|| palpate_servo::run(&model, limits, settings, &strain, &script, each));
-        let recording = recording.map_err(|e| to_python(py, e))?;
-        let file = file.map(Recorded::finish).transpose().map_err(|e| to_python(py, e))?;
+        let recording = py.detach(|| palpate_servo::run(&model, limits, settings, &strain, &script, each))?;
+        let file = file.map(RecordingInMemory::finish).transpose()?;
         let flat = |vectors: Vec<DVec3>| vectors.iter().flat_map(|f| f.to_array()).collect::<Vec<_>>().into_pyarray(py);
         let mut energies: Vec<Vec<f64>> = vec![Vec::new(); model.bodies.len()];
         for (body, of_body) in recording.energies {
@@ -345,13 +342,13 @@ impl SimulationCore {
         &self,
         py: Python<'_>,
         change: impl FnOnce(&mut Settings) -> palpate_core::Result<()>,
-    ) -> PyResult<()> {
+    ) -> Answer<()> {
         let mut parts = self.parts(py);
         let RunningParts { prepared, servo, .. } = &mut *parts;
         let mut settings = prepared.settings;
-        let changed = change(&mut settings).and_then(|()| settings.check(&prepared.model));
-        let taken = changed.and_then(|()| servo.as_mut().map_or(Ok(()), |servo| servo.set(settings)));
-        taken.map_err(|e| to_python(py, e))?;
+        change(&mut settings)?;
+        settings.check(&prepared.model)?;
+        servo.as_mut().map_or(Ok(()), |servo| servo.set(settings))?;
         prepared.settings = settings;
         Ok(())
     }

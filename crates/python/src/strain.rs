@@ -9,7 +9,7 @@ use palpate_core::contact::{Patch, PatchGeometry, PatchScratch, SurfaceQuery, pa
 use palpate_core::strain::{self, MAX_CONTACTS_WATCHED, StrainOperator};
 use pyo3::prelude::*;
 
-use crate::errors::to_python;
+use crate::errors::Answer;
 use crate::green::{GreenCore, Interior};
 
 /// How strain is measured on one body.
@@ -37,12 +37,12 @@ impl StrainMeasure {
         columns: PyReadonlyArray1<'_, u32>,
         values: PyReadonlyArray1<'_, f64>,
         interior: &Interior,
-    ) -> PyResult<Self> {
+    ) -> Answer<Self> {
         let start: Vec<usize> = start.as_slice()?.iter().map(|&s| usize::try_from(s).unwrap_or(usize::MAX)).collect();
         let operator = StrainOperator { start: &start, columns: columns.as_slice()?, values: values.as_slice()? };
         let interior = interior.interior.clone();
-        let measure = py.detach(|| strain::StrainMeasure::of_elements(operator, interior));
-        Ok(Self { measure: Arc::new(measure.map_err(|e| to_python(py, e))?) })
+        let measure = py.detach(|| strain::StrainMeasure::of_elements(operator, interior))?;
+        Ok(Self { measure: Arc::new(measure) })
     }
 
     /// By the surface of a store alone.
@@ -58,13 +58,13 @@ impl StrainMeasure {
         green: &GreenCore,
         patches: Vec<PatchArrays<'_>>,
         limit: f64,
-    ) -> PyResult<StrainResponse> {
+    ) -> Answer<StrainResponse> {
         let slices = patches
             .iter()
             .map(|(nodes, weights)| Ok((nodes.as_slice()?, weights.as_slice()?)))
-            .collect::<PyResult<Vec<_>>>()?;
-        let response = py.detach(|| self.measure.prepare(&green.green, &slices, limit).map(Box::new));
-        Ok(StrainResponse { response: response.map_err(|e| to_python(py, e))? })
+            .collect::<Answer<Vec<_>>>()?;
+        let response = py.detach(|| self.measure.prepare(&green.green, &slices, limit).map(Box::new))?;
+        Ok(StrainResponse { response })
     }
 
     /// Displacement gradients at all places: first entry of each place and the end (p + 1), node (k) and coefficients
@@ -81,9 +81,9 @@ impl StrainMeasure {
     }
 
     /// Largest strain of displacements (3s) of the surface, m.
-    fn largest(&self, py: Python<'_>, displacements: PyReadonlyArray1<'_, f64>) -> PyResult<f64> {
+    fn largest(&self, py: Python<'_>, displacements: PyReadonlyArray1<'_, f64>) -> Answer<f64> {
         let displacements = displacements.as_slice()?;
-        py.detach(|| self.measure.largest(displacements)).map_err(|e| to_python(py, e))
+        Ok(py.detach(|| self.measure.largest(displacements))?)
     }
 }
 
@@ -96,23 +96,22 @@ impl StrainResponse {
     }
 
     /// Largest share in [0, 1] of forces (N), one on each patch, within a limit.
-    fn share(&self, py: Python<'_>, forces: Vec<[f64; 3]>, limit: f64) -> PyResult<f64> {
-        Ok(self.response.share(&self.all(py, &forces)?, limit))
+    fn share(&self, forces: Vec<[f64; 3]>, limit: f64) -> Answer<f64> {
+        Ok(self.response.share(&self.all(&forces)?, limit))
     }
 
     /// Largest strain at the places under forces (N), one on each patch.
-    fn largest(&self, py: Python<'_>, forces: Vec<[f64; 3]>) -> PyResult<f64> {
-        Ok(self.response.largest(&self.all(py, &forces)?))
+    fn largest(&self, forces: Vec<[f64; 3]>) -> Answer<f64> {
+        Ok(self.response.largest(&self.all(&forces)?))
     }
 }
 
 impl StrainResponse {
     /// Forces of all contacts that can be watched.
-    fn all(&self, py: Python<'_>, forces: &[[f64; 3]]) -> PyResult<[DVec3; MAX_CONTACTS_WATCHED]> {
+    fn all(&self, forces: &[[f64; 3]]) -> palpate_core::Result<[DVec3; MAX_CONTACTS_WATCHED]> {
         if forces.len() != self.response.contacts() {
             let (count, given) = (self.response.contacts(), forces.len());
-            let error = Error::Invalid(format!("a force for each of {count} contacts is needed, got {given}"));
-            return Err(to_python(py, error));
+            return Err(Error::Invalid(format!("a force for each of {count} contacts is needed, got {given}")));
         }
         Ok(std::array::from_fn(|c| forces.get(c).map_or(DVec3::ZERO, |&f| f.into())))
     }
@@ -126,7 +125,7 @@ pub fn provisional_displacement(
     positions: PyReadonlyArray1<'_, f64>,
     floor: f64,
     limit: f64,
-) -> PyResult<f64> {
+) -> Answer<f64> {
     let positions: Vec<DVec3> = positions.as_slice()?.chunks_exact(3).map(DVec3::from_slice).collect();
     Ok(strain::provisional_displacement(weights.as_slice()?, &positions, floor, limit))
 }
@@ -139,14 +138,14 @@ pub fn contact_patch<'py>(
     green: &GreenCore,
     point: [f64; 3],
     radius: f64,
-) -> PyResult<(Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<f64>>)> {
+) -> Answer<(Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<f64>>)> {
     let surface = &green.green.surface;
     let mut patch = Patch::default();
-    let query = SurfaceQuery::new(surface).map_err(|e| to_python(py, e))?;
+    let query = SurfaceQuery::new(surface)?;
     if let Some(centre) = query.closest(surface, point.into()) {
         let (geometry, mut scratch) = (PatchGeometry::new(surface), PatchScratch::new(surface));
         patch_weights(surface, &geometry, &centre, radius, &mut scratch, &mut patch)
-            .map_err(|refusal| to_python(py, Error::Invalid(refusal.message().into())))?;
+            .map_err(|refusal| Error::Invalid(refusal.message().into()))?;
     }
     Ok((patch.nodes().to_vec().into_pyarray(py), patch.weights().to_vec().into_pyarray(py)))
 }

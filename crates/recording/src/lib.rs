@@ -4,12 +4,14 @@
 //! ([`Recorder`]), and [`Ticks`] gives them back, bit for bit, also from a file that was cut short.
 
 mod checksummed;
+mod memory;
 mod messages;
 mod reader;
 mod recorder;
 mod schemas;
 mod writer;
 
+pub use memory::RecordingInMemory;
 pub use messages::same_settings;
 pub use reader::{FileEnd, Ticks};
 pub use recorder::{Recorder, RecorderStatus};

@@ -7,7 +7,7 @@ use palpate_core::Result;
 use palpate_core::contact::Moduli;
 use palpate_core::dynamics::{Integration, ModalModel, Newmark, Rayleigh};
 use palpate_core::green::GreensFunction;
-use palpate_core::simulation::{BodyDynamics, BodyModel, KnownSeries, Placement};
+use palpate_core::simulation::{BodyDynamics, BodyModel, KnownSeries, Placement, Pose};
 use palpate_core::strain::StrainMeasure;
 
 use crate::store_defaults::moduli_of_store;
@@ -102,6 +102,21 @@ impl Body {
 /// From w x y z, made of length one to the last bit.
 pub fn unit_quaternion([w, x, y, z]: [f64; 4]) -> DQuat {
     DQuat::from_xyzw(x, y, z, w).normalize()
+}
+
+/// As w x y z.
+pub fn wxyz(q: DQuat) -> [f64; 4] {
+    [q.w, q.x, q.y, q.z]
+}
+
+/// Where a device is to be, by a position, m, and an orientation w x y z; where the position is not finite, which takes the tool
+/// out of the scene, the orientation is not read.
+pub fn device_pose(position: [f64; 3], orientation: [f64; 4]) -> Pose {
+    let present = position.iter().all(|x| x.is_finite());
+    Pose {
+        position: position.into(),
+        orientation: if present { unit_quaternion(orientation) } else { DQuat::IDENTITY },
+    }
 }
 
 /// From a position, m, and a unit quaternion w x y z.

@@ -17,7 +17,7 @@ mod prepared;
 mod store_defaults;
 mod tool;
 
-pub use body::{Body, Motion, placement, unit_quaternion};
+pub use body::{Body, Motion, device_pose, placement, unit_quaternion, wxyz};
 pub use graph::{BodyId, Scene, ToolId};
 pub use packed::{checksum, read_tool};
 pub use prepared::{PreparedScene, carried_over};

@@ -56,21 +56,20 @@ impl Emulation<'_> {
     ) -> Result<()> {
         let (mut handles, devices): (Vec<_>, Vec<_>) =
             devices.into_iter().map(|(handle, device)| (handle, Box::new(device) as Box<dyn Device>)).unzip();
+        let Self { model, limits, settings, strain, period } = *self;
         let (mut force_loop, mut handle) =
-            ForceLoop::with_clock(self.model.clone(), devices, self.limits, self.settings, (|| 0, LOG_ROWS))?;
-        force_loop.limit_strain_of(self.strain.limitable());
-        let mut preparation = Preparation::new(handle.take_strain()?, self.strain);
+            ForceLoop::without_clock(model, devices, limits, settings, strain, LOG_ROWS)?;
+        let mut preparation = Preparation::new(&mut handle, strain)?;
         for number in 0.. {
             preparation.hand_over(number);
-            force_loop.tick((1e9 * self.period * number as f64).round() as u64, self.period);
+            force_loop.tick((1e9 * period * number as f64).round() as u64, period);
             preparation.prepare(number);
             let status = &handle.latest().status;
             let (readings, wrenches, fault) = (status.readings, status.wrenches, status.fault);
             let mut tick = EmulatedTick { number, readings, wrenches, fault, ..EmulatedTick::default() };
-            tick.true_motions
-                .iter_mut()
-                .zip(&mut handles)
-                .for_each(|(true_motion, device)| *true_motion = device.true_motion());
+            for (true_motion, device) in tick.true_motions.iter_mut().zip(&mut handles) {
+                *true_motion = device.true_motion();
+            }
             if each(&tick, &mut handles).is_break() {
                 break;
             }

@@ -68,8 +68,23 @@ impl ForceLoop {
         Self::with_clock(model, devices, limits, settings, (clock::now_ns, LOG_ROWS))
     }
 
+    /// For ticks that nobody times, with room for so many rows of the log; what prepares strain responses between them has yet to
+    /// be taken from the handle.
+    pub(crate) fn without_clock(
+        model: &Arc<Model>,
+        devices: Vec<Box<dyn Device>>,
+        limits: SafetyLimits,
+        settings: Settings,
+        strain: &StrainPreparer,
+        log_rows: usize,
+    ) -> Result<(Self, LoopHandle)> {
+        let (mut force_loop, handle) = Self::with_clock(model.clone(), devices, limits, settings, (|| 0, log_rows))?;
+        force_loop.limit_strain_of(strain.limitable());
+        Ok((force_loop, handle))
+    }
+
     /// With a clock to measure ticks by, and room for so many rows of the log.
-    pub(crate) fn with_clock(
+    fn with_clock(
         model: Arc<Model>,
         devices: Vec<Box<dyn Device>>,
         limits: SafetyLimits,

@@ -6,6 +6,7 @@
 
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
+mod caller;
 mod change;
 mod clock;
 mod commands;

@@ -7,7 +7,7 @@ use palpate_core::Result;
 use palpate_core::contact::Refusal;
 use palpate_core::dynamics::Energy;
 use palpate_core::simulation::{Model, Pose, Strike};
-use palpate_devices::{Device, DeviceLimits};
+use palpate_devices::DeviceLimits;
 
 use crate::force_loop::ForceLoop;
 use crate::handoff::LOG_ROWS;
@@ -15,7 +15,7 @@ use crate::platform::computed_ns;
 use crate::preparation::Preparation;
 use crate::preparer::StrainPreparer;
 use crate::record::{RecordedInput, TickRecord};
-use crate::replay::ReplayedDevice;
+use crate::replay::{ReplayedDevice, hand_over};
 use crate::safety::{Fault, SafetyLimits};
 use crate::settings::{Settings, check_node, refuse_unless};
 use crate::stepper::Stepper;
@@ -121,25 +121,15 @@ pub fn rerun(
     inputs: impl IntoIterator<Item = Result<RecordedInput>>,
     mut each: impl FnMut(&TickRecord),
 ) -> Result<()> {
-    let (mut readings, devices): (Vec<_>, Vec<_>) = devices.iter().map(|&limits| ReplayedDevice::new(limits)).unzip();
-    let devices = devices.into_iter().map(|device| Box::new(device) as Box<dyn Device>).collect();
-    let (mut force_loop, mut handle) =
-        ForceLoop::with_clock(model.clone(), devices, limits, settings, (|| 0, LOG_ROWS))?;
-    force_loop.limit_strain_of(strain.limitable());
-    let mut preparation = Preparation::new(handle.take_strain()?, strain);
+    let (mut readings, devices): (Vec<_>, _) = devices.iter().map(|&limits| ReplayedDevice::boxed(limits)).unzip();
+    let (mut force_loop, mut handle) = ForceLoop::without_clock(model, devices, limits, settings, strain, LOG_ROWS)?;
+    let mut preparation = Preparation::new(&mut handle, strain)?;
     let mut records = handle.begin_recording()?;
     let mut settings = settings;
     for (tick, input) in inputs.into_iter().enumerate() {
         let input = input?;
         settings.time_scale = input.settings.time_scale;
-        handle.set(settings)?;
-        if input.reset {
-            handle.reset()?;
-        }
-        input.strike.map_or(Ok(()), |strike| handle.strike(strike))?;
-        for (readings, reading) in readings.iter_mut().zip(&input.readings) {
-            let _ = readings.push(*reading);
-        }
+        hand_over(&input, settings, &mut handle, &mut readings)?;
         preparation.hand_over(tick);
         force_loop.tick(input.due_ns, input.period);
         preparation.prepare(tick);

@@ -2,6 +2,9 @@
 
 use std::collections::VecDeque;
 
+use palpate_core::Result;
+
+use crate::handoff::LoopHandle;
 use crate::preparer::StrainPreparer;
 use crate::strain::{PreparerEnd, StrainAnswer};
 
@@ -16,8 +19,8 @@ pub(crate) struct Preparation {
 }
 
 impl Preparation {
-    pub(crate) fn new(end: PreparerEnd, strain: &StrainPreparer) -> Self {
-        Self { end, strain: strain.clone(), due: VecDeque::new() }
+    pub(crate) fn new(handle: &mut LoopHandle, strain: &StrainPreparer) -> Result<Self> {
+        Ok(Self { end: handle.take_strain()?, strain: strain.clone(), due: VecDeque::new() })
     }
 
     pub(crate) fn hand_over(&mut self, tick: usize) {

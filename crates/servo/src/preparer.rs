@@ -1,16 +1,16 @@
 //! Preparation of strain responses, by a thread beside the loop or between the ticks of an offline run.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::JoinHandle;
+use std::sync::atomic::Ordering;
 
+use palpate_core::Result;
 #[cfg(feature = "strain")]
 use palpate_core::simulation::StrainWatch;
 use palpate_core::simulation::{MAX_BODIES, Model};
 #[cfg(feature = "strain")]
 use palpate_core::strain::StrainMeasure;
-use palpate_core::{Error, Result};
 
+use crate::caller::Worker;
 use crate::strain::{PreparerEnd, StrainAnswer, StrainRequest};
 
 /// What measures the strain of the bodies of a model, as far as it is known. Built without the feature
@@ -87,8 +87,7 @@ impl PreparerEnd {
 
 /// A thread that prepares strain responses, woken by the loop; it ends when this is dropped.
 pub struct StrainWorker {
-    stop: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
+    _thread: Worker,
 }
 
 impl StrainWorker {
@@ -97,30 +96,19 @@ impl StrainWorker {
     /// # Errors
     /// The operating system's.
     pub(crate) fn start(mut end: PreparerEnd, preparer: StrainPreparer) -> Result<Self> {
-        let stop = Arc::new(AtomicBool::new(false));
-        let (stopped, worker) = (stop.clone(), end.worker.clone());
-        let work = move || {
-            while !stopped.load(Ordering::Acquire) {
+        let waker = end.worker.clone();
+        let worker = Worker::start("palpate-strain", move |stop| {
+            while !stop.load(Ordering::Acquire) {
                 match end.prepare_one(&preparer) {
                     Some(Some(response)) => end.send(response),
                     Some(None) => {}
                     None => std::thread::park(),
                 }
             }
-        };
-        let thread = std::thread::Builder::new().name("palpate-strain".into()).spawn(work);
-        let thread = thread.map_err(|source| Error::Io { path: "palpate-strain".into(), source })?;
-        let _ = worker.set(thread.thread().clone());
-        Ok(Self { stop, thread: Some(thread) })
-    }
-}
-
-impl Drop for StrainWorker {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Release);
-        if let Some(thread) = self.thread.take() {
-            thread.thread().unpark();
-            let _ = thread.join();
+        })?;
+        if let Some(thread) = worker.thread() {
+            let _ = waker.set(thread.clone());
         }
+        Ok(Self { _thread: worker })
     }
 }

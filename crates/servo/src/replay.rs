@@ -11,8 +11,7 @@ use palpate_devices::{Device, DeviceFault, DeviceLimits, Reading};
 use rtrb::{Consumer, Producer, RingBuffer};
 
 use crate::force_loop::ForceLoop;
-use crate::handoff::LOG_ROWS;
-use crate::handoff::{LoopHandle, Published};
+use crate::handoff::{LOG_ROWS, LoopHandle, Published};
 use crate::log::LogRow;
 use crate::platform::computed_ns;
 use crate::preparer::StrainPreparer;
@@ -47,13 +46,20 @@ pub enum Owner {
     Body(usize),
 }
 
+/// Empty for the scene.
+impl fmt::Display for Owner {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Owner::Scene => Ok(()),
+            Owner::Tool(tool) => write!(f, "tool {tool}"),
+            Owner::Body(body) => write!(f, "body {body}"),
+        }
+    }
+}
+
 impl fmt::Display for Difference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let of = match self.of {
-            Owner::Scene => String::new(),
-            Owner::Tool(tool) => format!("tool {tool}: "),
-            Owner::Body(body) => format!("body {body}: "),
-        };
+        let of = if self.of == Owner::Scene { String::new() } else { format!("{}: ", self.of) };
         let (tick, quantity) = (self.tick, self.quantity);
         write!(f, "tick {tick}: {of}{quantity} was {:?}, is {:?}", self.recorded, self.replayed)
     }
@@ -63,7 +69,7 @@ impl fmt::Display for Difference {
 pub struct Replay {
     force_loop: ForceLoop,
     handle: LoopHandle,
-    readings: Vec<Producer<Result<Reading, DeviceFault>>>,
+    readings: Vec<Readings>,
     records: Consumer<TickRecord>,
     strain: StrainPreparer,
     end: PreparerEnd,
@@ -84,15 +90,8 @@ impl Replay {
         settings: Settings,
         strain: StrainPreparer,
     ) -> Result<Self> {
-        let (mut readings, mut replayed) = (Vec::new(), Vec::new());
-        for &limits in devices {
-            let (producer, device) = ReplayedDevice::new(limits);
-            readings.push(producer);
-            replayed.push(Box::new(device) as Box<dyn Device>);
-        }
-        let (mut force_loop, mut handle) =
-            ForceLoop::with_clock(model.clone(), replayed, limits, settings, (|| 0, LOG_ROWS))?;
-        force_loop.limit_strain_of(strain.limitable());
+        let (readings, devices) = devices.iter().map(|&limits| ReplayedDevice::boxed(limits)).unzip();
+        let (force_loop, mut handle) = ForceLoop::without_clock(model, devices, limits, settings, &strain, LOG_ROWS)?;
         let (records, end) = (handle.begin_recording()?, handle.take_strain()?);
         let tools = model.tools.len();
         Ok(Self { force_loop, handle, readings, records, strain, end, requests: VecDeque::new(), tools, longest_ns: 0 })
@@ -126,16 +125,9 @@ impl Replay {
     }
 
     fn repeat_tick(&mut self, input: &RecordedInput) -> Result<Option<TickRecord>> {
-        self.handle.set(input.settings)?;
-        if input.reset {
-            self.handle.reset()?;
-        }
-        input.strike.map_or(Ok(()), |strike| self.handle.strike(strike))?;
-        for (readings, reading) in self.readings.iter_mut().zip(&input.readings) {
-            let _ = readings.push(*reading);
-        }
+        hand_over(input, input.settings, &mut self.handle, &mut self.readings)?;
         for &id in input.strain.arrived() {
-            self.hand_over(id);
+            self.answer(id);
         }
         self.force_loop.prepare_replay(input);
         let begun = computed_ns();
@@ -148,7 +140,7 @@ impl Replay {
     }
 
     /// Answers the request that was answered then. Those before it never were, and never will be.
-    fn hand_over(&mut self, id: StrainRequestId) {
+    fn answer(&mut self, id: StrainRequestId) {
         let answer = self.requests.iter().find(|request| request.id == id);
         if let Some(answer) = answer.and_then(|request| self.strain.prepare(request)) {
             self.end.send(answer);
@@ -157,6 +149,27 @@ impl Replay {
     }
 }
 
+/// Hands recorded inputs over for the next tick, with settings that are to hold: strikes, a reset, and what the devices said.
+pub(crate) fn hand_over(
+    input: &RecordedInput,
+    settings: Settings,
+    handle: &mut LoopHandle,
+    readings: &mut [Readings],
+) -> Result<()> {
+    handle.set(settings)?;
+    if input.reset {
+        handle.reset()?;
+    }
+    input.strike.map_or(Ok(()), |strike| handle.strike(strike))?;
+    for (readings, &reading) in readings.iter_mut().zip(&input.readings) {
+        let _ = readings.push(reading);
+    }
+    Ok(())
+}
+
+/// Where a device is given a reading before each tick.
+pub(crate) type Readings = Producer<Result<Reading, DeviceFault>>;
+
 /// A device that says what was recorded.
 pub(crate) struct ReplayedDevice {
     readings: Consumer<Result<Reading, DeviceFault>>,
@@ -164,10 +177,10 @@ pub(crate) struct ReplayedDevice {
 }
 
 impl ReplayedDevice {
-    /// One, and where it is told a reading before each tick.
-    pub(crate) fn new(limits: DeviceLimits) -> (Producer<Result<Reading, DeviceFault>>, Self) {
+    /// One, and where it is given its readings.
+    pub(crate) fn boxed(limits: DeviceLimits) -> (Readings, Box<dyn Device>) {
         let (producer, readings) = RingBuffer::new(1);
-        (producer, Self { readings, limits })
+        (producer, Box::new(Self { readings, limits }))
     }
 }
 

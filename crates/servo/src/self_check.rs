@@ -4,17 +4,12 @@
 //! no body but a task: to watch, or to push along a direction with a force that rises evenly and then ends. A tip that runs away,
 //! for nobody holds it, ends the push too.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::JoinHandle;
-
 use glam::DVec3;
-use palpate_core::{Error, Result};
-use palpate_devices::{Device, DeviceLimits, Reading, ReadyDevice, Scheduler, Wrench};
+use palpate_core::Result;
+use palpate_devices::{Device, DeviceLimits, Reading, ReadyDevice, Wrench};
 use triple_buffer::{Input, Output, triple_buffer};
 
-use crate::clock::{next_deadline, now_ns};
-use crate::platform::sleep_until_ns;
+use crate::caller::{Caller, Worker, tick_until};
 use crate::safety::{FaultReason, SafetyLimits, SafetyStage};
 use crate::settings::refuse_unless;
 
@@ -24,8 +19,8 @@ pub const LARGEST_FORCE: f64 = 0.5;
 /// A push ends where the tip has gone this far, m: a hand that holds it loosely yields less.
 const MAX_TRAVEL: f64 = 0.05;
 
-/// Rate of a thread of ours, Hz.
-const RATE: f64 = 1000.0;
+/// Time between two ticks of a thread of ours, s.
+const PERIOD: f64 = 1e-3;
 
 /// What to do, from the next tick on.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -82,12 +77,7 @@ pub struct SelfCheck {
     tasks: Input<(u64, Task)>,
     seen: Output<Observation>,
     number: u64,
-    caller: Option<Caller>,
-}
-
-enum Caller {
-    Thread(Arc<AtomicBool>, JoinHandle<()>),
-    Driver(Arc<dyn Scheduler>),
+    caller: Caller,
 }
 
 impl SelfCheck {
@@ -104,27 +94,13 @@ impl SelfCheck {
         let caller = match scheduler {
             Some(driver) => {
                 let period = 1.0 / driver.rate();
-                let started = driver.start(Box::new(move || ticker.tick(now_ns(), period)));
-                started.map_err(|error| Error::Invalid(error.to_string()))?;
-                Caller::Driver(driver)
+                Caller::driver(driver, move |now_ns| ticker.tick(now_ns, period))?
             }
-            None => {
-                let stop = Arc::new(AtomicBool::new(false));
-                let stopped = stop.clone();
-                let thread = std::thread::Builder::new().name("palpate-check".into()).spawn(move || {
-                    let period_ns = (1e9 / RATE).round() as u64;
-                    let mut deadline = now_ns() + period_ns;
-                    while !stopped.load(Ordering::Relaxed) {
-                        sleep_until_ns(deadline);
-                        ticker.tick(deadline, 1.0 / RATE);
-                        deadline = next_deadline(deadline, now_ns(), period_ns);
-                    }
-                });
-                let thread = thread.map_err(|source| Error::Io { path: "palpate-check".into(), source })?;
-                Caller::Thread(stop, thread)
-            }
+            None => Caller::Thread(Worker::start("palpate-check", move |stop| {
+                tick_until(stop, PERIOD, |deadline| ticker.tick(deadline, PERIOD));
+            })?),
         };
-        Ok(Self { name, limits, tasks, seen, number: 0, caller: Some(caller) })
+        Ok(Self { name, limits, tasks, seen, number: 0, caller })
     }
 
     /// What a person knows the device by.
@@ -164,14 +140,7 @@ impl SelfCheck {
 
     /// Ends the check; the device is left without a force.
     pub fn stop(&mut self) {
-        match self.caller.take() {
-            Some(Caller::Thread(stop, thread)) => {
-                stop.store(true, Ordering::Relaxed);
-                let _ = thread.join();
-            }
-            Some(Caller::Driver(driver)) => driver.stop(),
-            None => {}
-        }
+        self.caller.stop();
     }
 }
 

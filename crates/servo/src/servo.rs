@@ -2,20 +2,18 @@
 
 use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::JoinHandle;
 use std::time::Duration;
 
 use palpate_core::simulation::{KnownSeries, Model, PreviousRanks};
 use palpate_core::{Error, Result};
 use palpate_devices::{Device, DeviceFault, DeviceLimits, Reading, Scheduler, Wrench};
 
+use crate::caller::{Caller, Worker, tick_until};
 use crate::change::ChangeHandle;
-use crate::clock::{next_deadline, now_ns};
 use crate::force_loop::{ForceLoop, Successor};
 use crate::handoff::LoopHandle;
 use crate::log::RealtimeStatus;
-use crate::platform::{lock, sleep_until_ns};
+use crate::platform::lock;
 use crate::preparer::{StrainPreparer, StrainWorker};
 use crate::safety::SafetyLimits;
 use crate::scheduling::Scheduling;
@@ -42,14 +40,6 @@ pub struct Servo {
     worker: StrainWorker,
 }
 
-/// Who calls the tick.
-enum Caller {
-    /// A thread of this crate, until it is stopped.
-    Thread { stop: Arc<AtomicBool>, thread: Option<JoinHandle<()>> },
-    /// A driver, from its own.
-    Driver(Arc<dyn Scheduler>),
-}
-
 impl Servo {
     /// Starts the loop with one device a tool, and beside it a thread that prepares the strain of contacts. Where some device
     /// has a `scheduler`, its driver calls the tick at its own rate; else a thread does, scheduled as told.
@@ -74,7 +64,10 @@ impl Servo {
         force_loop.check_period(period)?;
         let changes = force_loop.take_change_handle();
         let (caller, realtime) = match scheduler {
-            Some(scheduler) => (start_driver(force_loop, period, scheduler)?, RealtimeStatus::default()),
+            Some(driver) => {
+                let tick = move |now_ns| force_loop.tick(now_ns, period);
+                (Caller::driver(driver, tick)?, RealtimeStatus::default())
+            }
             None => start_thread(force_loop, period, scheduling)?,
         };
         Ok(Self { caller, handle, changes, realtime, limits, period, devices: device_limits, worker })
@@ -154,35 +147,29 @@ impl Servo {
 
     /// A loop that ticks makes room within one.
     fn wait_for_room(&self) {
-        let mut left = MAX_ROOM_POLLS;
-        while self.handle.is_full() && left > 0 {
-            std::thread::sleep(POLL_INTERVAL);
-            left -= 1;
-        }
+        wait_while(MAX_ROOM_POLLS, || self.handle.is_full());
     }
 
     /// Ends the recording and waits until the loop has taken note of it: how many ticks it made meanwhile.
     pub fn end_recording(&mut self) -> u64 {
         self.handle.end_recording();
-        let mut left = MAX_POLLS;
-        while self.handle.latest().status.recording.records && left > 0 {
-            std::thread::sleep(POLL_INTERVAL);
-            left -= 1;
-        }
+        wait_while(MAX_POLLS, || self.handle.latest().status.recording.records);
         self.handle.latest().status.recording.ticks
     }
 
     /// Stops the loop; the devices are left without a wrench.
     pub fn stop(&mut self) {
-        match &mut self.caller {
-            Caller::Thread { stop, thread } => {
-                stop.store(true, Ordering::Relaxed);
-                if let Some(thread) = thread.take() {
-                    let _ = thread.join();
-                }
-            }
-            Caller::Driver(scheduler) => scheduler.stop(),
+        self.caller.stop();
+    }
+}
+
+/// Waits while something holds, for so many polls at most.
+fn wait_while(polls: u32, mut holds: impl FnMut() -> bool) {
+    for _ in 0..polls {
+        if !holds() {
+            break;
         }
+        std::thread::sleep(POLL_INTERVAL);
     }
 }
 
@@ -244,43 +231,20 @@ impl Device for PlaceholderDevice {
 
 /// Has a thread of its own call the tick.
 fn start_thread(mut force_loop: ForceLoop, period: f64, scheduling: Scheduling) -> Result<(Caller, RealtimeStatus)> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let stopped = stop.clone();
     // Locking the memory of a large body takes a tenth of a second: wait, so that the first target set after the
     // start is seen by a running loop.
     let (ready_in, ready_out) = std::sync::mpsc::sync_channel(1);
-    let ticks = move || {
+    let worker = Worker::start("palpate-servo", move |stop| {
         let granted = scheduling.apply(force_loop.memory());
         let realtime = granted.as_ref().copied().unwrap_or_default();
         force_loop.set_realtime(realtime);
         let refused = granted.is_err();
         let _ = ready_in.send(granted);
         if !refused {
-            run(&mut force_loop, period, &stopped);
+            tick_until(stop, period, |deadline| force_loop.tick(deadline, period));
         }
-    };
-    let thread = std::thread::Builder::new().name("palpate-servo".into()).spawn(ticks);
-    let thread = thread.map_err(|source| Error::Io { path: "palpate-servo".into(), source })?;
+    })?;
     let ended = || Error::Invalid("the loop's thread ended before its first tick".into());
     let realtime = ready_out.recv().map_err(|_| ended())??;
-    Ok((Caller::Thread { stop, thread: Some(thread) }, realtime))
-}
-
-/// Has a driver call the tick.
-fn start_driver(mut force_loop: ForceLoop, period: f64, scheduler: Arc<dyn Scheduler>) -> Result<Caller> {
-    let tick = Box::new(move || force_loop.tick(now_ns(), period));
-    scheduler.start(tick).map_err(|error| Error::Invalid(error.to_string()))?;
-    Ok(Caller::Driver(scheduler))
-}
-
-/// Ticks on a grid of deadlines until stopped.
-fn run(force_loop: &mut ForceLoop, period: f64, stop: &AtomicBool) {
-    let period_ns = (1e9 * period).round() as u64;
-    let mut deadline = now_ns() + period_ns;
-    while !stop.load(Ordering::Relaxed) {
-        sleep_until_ns(deadline);
-        force_loop.tick(deadline, period);
-        // Deadlines that have passed meanwhile are counted by the tick.
-        deadline = next_deadline(deadline, now_ns(), period_ns);
-    }
+    Ok((Caller::Thread(worker), realtime))
 }

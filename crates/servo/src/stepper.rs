@@ -6,14 +6,13 @@ use std::sync::Arc;
 
 use palpate_core::Result;
 use palpate_core::simulation::{Model, Pose, TaxelGrid};
-use palpate_devices::{Buttons, Device, DeviceFault, DeviceLimits, Reading, Twist, Wrench};
-use rtrb::Producer;
+use palpate_devices::{Buttons, DeviceLimits, Reading, Twist, Wrench};
 
 use crate::force_loop::ForceLoop;
 use crate::handoff::{LoopHandle, Published};
 use crate::preparation::Preparation;
 use crate::preparer::StrainPreparer;
-use crate::replay::ReplayedDevice;
+use crate::replay::{Readings, ReplayedDevice};
 use crate::safety::SafetyLimits;
 use crate::settings::Settings;
 
@@ -26,7 +25,7 @@ pub struct Stepper {
     force_loop: ForceLoop,
     pub(crate) handle: LoopHandle,
     preparation: Preparation,
-    readings: Vec<Producer<std::result::Result<Reading, DeviceFault>>>,
+    readings: Vec<Readings>,
     /// The last reading of each tool.
     latest: Vec<Reading>,
     ticks: usize,
@@ -48,18 +47,14 @@ impl Stepper {
         strain: &StrainPreparer,
     ) -> Result<Self> {
         let tools = model.tools.len();
-        let (mut readings, mut replayed) = (Vec::new(), Vec::new());
-        for tool in 0..tools {
-            // A pose is commanded: it may jump.
+        let device = |tool: usize| {
             let limits = devices.get(tool).copied().unwrap_or(DeviceLimits::UNLIMITED);
-            let (producer, device) = ReplayedDevice::new(DeviceLimits { max_speed: None, ..limits });
-            readings.push(producer);
-            replayed.push(Box::new(device) as Box<dyn Device>);
-        }
-        let (mut force_loop, mut handle) =
-            ForceLoop::with_clock(model.clone(), replayed, limits, settings, (|| 0, LOG_ROWS))?;
-        force_loop.limit_strain_of(strain.limitable());
-        let preparation = Preparation::new(handle.take_strain()?, strain);
+            // A pose is commanded: it may jump.
+            ReplayedDevice::boxed(DeviceLimits { max_speed: None, ..limits })
+        };
+        let (readings, devices) = (0..tools).map(device).unzip();
+        let (force_loop, mut handle) = ForceLoop::without_clock(model, devices, limits, settings, strain, LOG_ROWS)?;
+        let preparation = Preparation::new(&mut handle, strain)?;
         let latest = vec![Reading::default(); tools];
         let (model, ticks, now_ns, period) = (model.clone(), 0, 0, 0.0);
         Ok(Self { model, force_loop, handle, preparation, readings, latest, ticks, now_ns, period })

@@ -6,7 +6,7 @@
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use palpate_core::files;
+use palpate_core::{Error, Result, files};
 
 use crate::command::Command;
 use crate::session::Session;
@@ -30,21 +30,25 @@ fn module() -> MutexGuard<'static, Option<Module>> {
     MODULE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Does something with the session: 0, or -1 with the reason as text.
-fn with_session(work: impl FnOnce(&mut Session, &mut Vec<u8>, &mut Vec<f64>) -> Result<(), String>) -> i32 {
+/// Does something with the module: 0, or -1 with the reason as text.
+fn with_module(work: impl FnOnce(&mut Module) -> Result<()>) -> i32 {
     let mut module = module();
-    let Module { session, text, numbers } = module.get_or_insert_default();
-    let done = match session {
-        Some(session) => work(session, text, numbers),
-        None => Err("no scene is open".into()),
-    };
-    match done {
+    let module = module.get_or_insert_default();
+    match work(module) {
         Ok(()) => 0,
-        Err(reason) => {
-            *text = reason.into_bytes();
+        Err(error) => {
+            module.text = error.to_string().into_bytes();
             -1
         }
     }
+}
+
+/// The same with its session, and where its texts and numbers go.
+fn with_session(work: impl FnOnce(&mut Session, &mut Vec<u8>, &mut Vec<f64>) -> Result<()>) -> i32 {
+    with_module(|Module { session, text, numbers }| {
+        let none = || Error::Invalid("no scene is open".into());
+        work(session.as_mut().ok_or_else(none)?, text, numbers)
+    })
 }
 
 /// Memory of `length` bytes, aligned for numbers.
@@ -82,18 +86,10 @@ pub unsafe extern "C" fn palpate_provide(name: *const u8, name_length: usize, by
 pub extern "C" fn palpate_open() -> i32 {
     let opened = Session::open(&Path::new(FOLDER).join("scene.json"));
     files::keep_provided(|path| path.to_string_lossy().ends_with(CONTACTS));
-    let mut module = module();
-    let module = module.get_or_insert_default();
-    match opened {
-        Ok(session) => {
-            module.session = Some(session);
-            0
-        }
-        Err(error) => {
-            module.text = error.to_string().into_bytes();
-            -1
-        }
-    }
+    with_module(|module| {
+        module.session = Some(opened?);
+        Ok(())
+    })
 }
 
 /// Carries out a command in JSON.
@@ -105,8 +101,8 @@ pub unsafe extern "C" fn palpate_command(text: *const u8, length: usize) -> i32 
     // SAFETY: by the caller.
     let text = unsafe { std::slice::from_raw_parts(text, length) };
     with_session(|session, _, _| {
-        let command: Command = serde_json::from_slice(text).map_err(|error| error.to_string())?;
-        command.apply(session).map_err(|error| error.to_string())
+        let command = serde_json::from_slice::<Command>(text).map_err(|error| Error::Invalid(error.to_string()))?;
+        command.apply(session)
     })
 }
 
@@ -154,7 +150,7 @@ pub unsafe extern "C" fn palpate_run(positions: *const f64, count: usize) -> i32
     // SAFETY: by the caller.
     let positions = unsafe { std::slice::from_raw_parts(positions, count) };
     with_session(|session, _, numbers| {
-        *numbers = run::forces(session, positions).map_err(|error| error.to_string())?;
+        *numbers = run::forces(session, positions)?;
         Ok(())
     })
 }
@@ -169,7 +165,7 @@ pub unsafe extern "C" fn palpate_times(positions: *const f64, count: usize, orie
     // SAFETY: by the caller.
     let (positions, orientation) = unsafe { (std::slice::from_raw_parts(positions, count), *orientation) };
     with_session(|session, _, numbers| {
-        *numbers = run::times(session, positions, orientation).map_err(|error| error.to_string())?;
+        *numbers = run::times(session, positions, orientation)?;
         Ok(())
     })
 }
@@ -178,7 +174,7 @@ pub unsafe extern "C" fn palpate_times(positions: *const f64, count: usize, orie
 #[unsafe(no_mangle)]
 pub extern "C" fn palpate_end_recording() -> i32 {
     with_session(|session, text, _| {
-        *text = session.end_recording().map_err(|error| error.to_string())?;
+        *text = session.end_recording()?;
         Ok(())
     })
 }

@@ -1,6 +1,7 @@
 //! The latest tick as the page draws it: its numbers as JSON, fields as arrays.
 
 use palpate_core::simulation::{Contact, LawKind, Mode};
+use palpate_scene::wxyz;
 use serde_json::{Value, json};
 
 use crate::session::Session;
@@ -25,10 +26,9 @@ pub fn frame(session: &mut Session) -> Value {
             let placement = &model.bodies[contact.body].placement;
             placement.point_to_world(contact.anchor) + placement.vector_to_world(contact.displacement)
         });
-        let q = device.orientation;
         json!({
             "position": position.to_array(),
-            "orientation": [q.w, q.x, q.y, q.z],
+            "orientation": wxyz(device.orientation),
             "active": status.readings[tool].active,
             "limited": limited,
             "wanted": limited.then(|| device.position.to_array()),

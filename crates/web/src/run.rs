@@ -1,7 +1,9 @@
 //! Runs of given positions, tick by tick without a clock: as `palpate.Simulation.run` makes them.
 
+use glam::DVec3;
 use palpate_core::simulation::Pose;
 use palpate_core::{Error, Result};
+use palpate_scene::unit_quaternion;
 use palpate_servo::{Recording, Script, run};
 
 use crate::session::Session;
@@ -13,8 +15,8 @@ use crate::session::Session;
 /// Positions that are no rows of three.
 pub fn forces(session: &Session, positions: &[f64]) -> Result<Vec<f64>> {
     let tools = session.scene.tools.len();
-    let away = Pose { position: glam::DVec3::NAN, ..Pose::default() };
-    let of_tick = |&row: &[f64; 3]| (0..tools).map(move |tool| if tool == 0 { Session::pose(row) } else { away });
+    let away = Pose::at(DVec3::NAN);
+    let of_tick = |&row: &[f64; 3]| (0..tools).map(move |tool| if tool == 0 { Pose::at(row.into()) } else { away });
     let poses: Vec<Pose> = rows(positions)?.iter().flat_map(of_tick).collect();
     let made = play(session, &poses)?;
     Ok(made.forces.chunks_exact(tools).flat_map(|forces| forces[0].to_array()).collect())
@@ -25,19 +27,15 @@ pub fn forces(session: &Session, positions: &[f64]) -> Result<Vec<f64>> {
 ///
 /// # Errors
 /// Positions that are no rows of three for each tool, or a fault.
-pub fn times(session: &Session, positions: &[f64], [w, x, y, z]: [f64; 4]) -> Result<Vec<f64>> {
-    let orientation = glam::DQuat::from_xyzw(x, y, z, w).normalize();
-    let poses: Vec<Pose> = rows(positions)?.iter().map(|&row| Pose { orientation, ..Session::pose(row) }).collect();
+pub fn times(session: &Session, positions: &[f64], orientation: [f64; 4]) -> Result<Vec<f64>> {
+    let orientation = unit_quaternion(orientation);
+    let poses: Vec<Pose> = rows(positions)?.iter().map(|&row| Pose { position: row.into(), orientation }).collect();
     let made = play(session, &poses)?;
-    match made.fault {
-        Some(fault) => Err(Error::Invalid(fault.to_string())),
-        None => Ok(made
-            .compute_ns
-            .iter()
-            .map(|&ns| 1e-3 * ns as f64)
-            .chain(made.forces.iter().flat_map(|f| f.to_array()))
-            .collect()),
+    if let Some(fault) = made.fault {
+        return Err(Error::Invalid(fault.to_string()));
     }
+    let times = made.compute_ns.iter().map(|&ns| 1e-3 * ns as f64);
+    Ok(times.chain(made.forces.iter().flat_map(|f| f.to_array())).collect())
 }
 
 fn rows(positions: &[f64]) -> Result<&[[f64; 3]]> {

@@ -1,17 +1,14 @@
 //! A running scene: its loop, its simulated devices, and a recording under way.
 
 use std::collections::BTreeMap;
-use std::io::Cursor;
 use std::path::Path;
 
-use glam::{DQuat, DVec3};
-use palpate_core::simulation::Pose;
+use glam::DVec3;
 use palpate_core::{Error, Result};
-use palpate_devices::simulated::{Handle, Target, simulated};
-use palpate_devices::{Device, DeviceLimits, MountedDevice, Workspace};
-use palpate_recording::{Header, TickWriter};
-use palpate_scene::{PreparedScene, Scene, Tool};
-use palpate_servo::{LogRow, PacedLoop, Published, TickRecord};
+use palpate_devices::simulated::{Handle, Target, simulated_with};
+use palpate_recording::{Header, RecordingInMemory};
+use palpate_scene::{PreparedScene, Scene, Tool, unit_quaternion};
+use palpate_servo::{LogRow, PacedLoop, Published, Settings, TickRecord};
 use rtrb::Consumer;
 
 /// A scene and its loop.
@@ -29,9 +26,7 @@ pub struct Session {
 /// Ticks on their way into bytes.
 struct Recording {
     records: Consumer<TickRecord>,
-    writer: TickWriter<Cursor<Vec<u8>>>,
-    ticks: u64,
-    failed: Option<String>,
+    file: RecordingInMemory,
 }
 
 impl Session {
@@ -91,9 +86,7 @@ impl Session {
     pub fn press(&mut self, tool: usize, position: [f64; 3], orientation: Option<[f64; 4]>, grab: bool) -> Result<()> {
         let (handle, target) = self.tool(tool)?;
         target.pose.position = position.into();
-        if let Some([w, x, y, z]) = orientation {
-            target.pose.orientation = DQuat::from_xyzw(x, y, z, w).normalize();
-        }
+        orientation.into_iter().for_each(|turned| target.pose.orientation = unit_quaternion(turned));
         (target.velocity, target.active, target.grab) = (DVec3::ZERO, true, grab);
         handle.set(*target);
         Ok(())
@@ -127,9 +120,7 @@ impl Session {
         if name == "contact_radius" {
             self.scene.model.check_contact_radius(value)?;
         }
-        self.paced.handle.set(settings)?;
-        self.scene.settings = settings;
-        Ok(())
+        self.change_settings(settings)
     }
 
     /// Watches a surface node, by its rank.
@@ -137,8 +128,10 @@ impl Session {
     /// # Errors
     /// A body or node that there is not.
     pub fn watch(&mut self, body: usize, node: u32) -> Result<()> {
-        let mut settings = self.scene.settings;
-        settings.watch = Some((body, node));
+        self.change_settings(Settings { watch: Some((body, node)), ..self.scene.settings })
+    }
+
+    fn change_settings(&mut self, settings: Settings) -> Result<()> {
         self.paced.handle.set(settings)?;
         self.scene.settings = settings;
         Ok(())
@@ -154,15 +147,14 @@ impl Session {
         }
         let (tools, bodies) = (self.scene.tools.len(), self.scene.bodies.len());
         let header = Header { about, tools, bodies, rate: self.scene.scheduling.rate, begun_ns };
-        let writer = TickWriter::new(Cursor::new(Vec::new()), header).map_err(invalid)?;
-        let records = self.paced.handle.begin_recording()?;
-        self.recording = Some(Recording { records, writer, ticks: 0, failed: None });
+        let file = RecordingInMemory::new(header)?;
+        self.recording = Some(Recording { records: self.paced.handle.begin_recording()?, file });
         Ok(())
     }
 
     /// Ticks recorded so far, and why no more are; `None` where nothing is recorded.
     pub fn recorded(&self) -> Option<(u64, Option<&str>)> {
-        self.recording.as_ref().map(|recording| (recording.ticks, recording.failed.as_deref()))
+        self.recording.as_ref().map(|recording| recording.file.status())
     }
 
     /// Ends the recording: the bytes of its file.
@@ -174,51 +166,23 @@ impl Session {
         let mut recording = self.recording.take().ok_or_else(none)?;
         self.paced.handle.end_recording();
         recording.take_up();
-        let ticks = recording.ticks;
-        match recording.failed {
-            Some(reason) => Err(Error::Invalid(reason)),
-            None => Ok(recording.writer.finish(Some(ticks)).map_err(invalid)?.into_inner()),
-        }
-    }
-
-    /// Pose of a press without a device.
-    pub(crate) fn pose(position: [f64; 3]) -> Pose {
-        Pose { position: position.into(), ..Pose::default() }
+        recording.file.finish()
     }
 }
 
 impl Recording {
     fn take_up(&mut self) {
         while let Ok(record) = self.records.pop() {
-            if self.failed.is_some() {
-                continue;
-            }
-            match self.writer.push(&record) {
-                Ok(()) => self.ticks += 1,
-                Err(error) => self.failed = Some(format!("the recording ends here: {error}")),
-            }
+            self.file.push(&record);
         }
     }
 }
 
 /// A loop of a scene, and what moves its tools.
 fn start(scene: &PreparedScene) -> Result<(PacedLoop, Vec<(Handle, Target)>)> {
-    let (handles, devices): (Vec<_>, Vec<_>) = scene.devices.iter().map(device_of).unzip();
+    let (handles, devices): (Vec<_>, Vec<_>) = scene.devices.iter().map(simulated_with).unzip();
     let period = 1.0 / scene.scheduling.rate;
     let limits = scene.limits.of_any_tick_time();
     let paced = PacedLoop::new(scene.model.clone(), devices, limits, scene.settings, scene.strain.clone(), period)?;
     Ok((paced, handles.into_iter().map(|handle| (handle, Target::default())).collect()))
-}
-
-/// A simulated device with the limits that the scene gives it, and what moves it.
-fn device_of(limits: &DeviceLimits) -> (Handle, Box<dyn Device>) {
-    let (handle, device) = simulated();
-    match *limits == DeviceLimits::UNLIMITED {
-        true => (handle, Box::new(device)),
-        false => (handle, Box::new(MountedDevice::new(Box::new(device), Workspace::default(), limits))),
-    }
-}
-
-fn invalid(error: impl std::fmt::Display) -> Error {
-    Error::Invalid(error.to_string())
 }

@@ -2,6 +2,8 @@
 
 import * as THREE from "three";
 
+import { colorTexture } from "./region_texture";
+
 /**
  * matplotlib's viridis (CC0), sRGB, in sixteenths, but for its darkest fifth: light falls on what is drawn, and nearly black
  * hides its shape. Straight lines between the samples are within 4/255.
@@ -33,11 +35,8 @@ export class ColorMap {
   private constructor(private readonly samples: number[]) {
     const texels = new Uint8Array(4 * WIDTH);
     for (let i = 0; i < WIDTH; i++) texels.set([...this.at(i / (WIDTH - 1)), 255], 4 * i);
-    this.texture = new THREE.DataTexture(texels, WIDTH, 1);
-    this.texture.colorSpace = THREE.SRGBColorSpace;
-    this.texture.magFilter = THREE.LinearFilter;
-    this.texture.minFilter = THREE.LinearFilter;
-    this.texture.needsUpdate = true;
+    this.texture = colorTexture(texels, WIDTH);
+    this.texture.magFilter = this.texture.minFilter = THREE.LinearFilter;
   }
 
   static readonly sequential = new ColorMap(VIRIDIS);

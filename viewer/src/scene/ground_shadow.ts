@@ -2,6 +2,7 @@
 
 import * as THREE from "three";
 
+import { colorTexture } from "./region_texture";
 import { shadowOf } from "./shadow_map";
 
 /** The ground lies below the body by this share of the scene, so that neither cuts the other. */
@@ -17,10 +18,8 @@ export function createGroundShadow(points: Float32Array, triangles: Uint32Array,
   const pixels = Math.sqrt(darkness.length);
   const texels = new Uint8Array(4 * darkness.length);
   darkness.forEach((part, i) => texels.set([...COLOR, Math.round(255 * part)], 4 * i));
-  const texture = new THREE.DataTexture(texels, pixels, pixels);
-  texture.colorSpace = THREE.SRGBColorSpace;
+  const texture = colorTexture(texels, pixels);
   texture.magFilter = texture.minFilter = THREE.LinearFilter;
-  texture.needsUpdate = true;
   const material = new THREE.MeshBasicMaterial({ map: texture, transparent: true, depthWrite: false });
   const mesh: GroundShadow = new THREE.Mesh(new THREE.PlaneGeometry(width, width), material);
   mesh.position.set(left + width / 2, bottom + width / 2, ground - BELOW * size);

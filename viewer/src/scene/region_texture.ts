@@ -4,8 +4,12 @@ import * as THREE from "three";
 
 /** Colours of a body's regions, one texel each. */
 export function regionTexture(colors: THREE.Color[]): THREE.DataTexture {
-  const texels = new Uint8Array(colors.flatMap((color) => [...bytesOf(color), 255]));
-  const texture = new THREE.DataTexture(texels, colors.length, 1);
+  return colorTexture(new Uint8Array(colors.flatMap((color) => [...bytesOf(color), 255])), colors.length);
+}
+
+/** A texture of sRGB colours with their opacity, so many to a row. */
+export function colorTexture(texels: Uint8Array, width: number): THREE.DataTexture {
+  const texture = new THREE.DataTexture(texels, width, texels.length / (4 * width));
   texture.colorSpace = THREE.SRGBColorSpace;
   texture.needsUpdate = true;
   return texture;

@@ -1,6 +1,8 @@
 // How dark the ground below a body is: what is seen of the sky from there. A place is dark where the body is just above it,
 // and the shadow is wider and fainter the higher the body stands.
 
+import { Box3 } from "three";
+
 /** Texels along a side: soft shadows need no more. */
 const TEXELS = 96;
 /** Room around the body for the edge of the shadow, over its longer side on the ground. */
@@ -24,17 +26,12 @@ export interface ShadowMap {
 
 /** From points (n, 3) in the scene, m, and triangles (k, 3); z is up. */
 export function shadowOf(points: Float32Array, triangles: Uint32Array): ShadowMap {
-  const low = [Infinity, Infinity, Infinity];
-  const high = [-Infinity, -Infinity, -Infinity];
-  for (let i = 0; i < points.length; i++) {
-    low[i % 3] = Math.min(low[i % 3]!, points[i]!);
-    high[i % 3] = Math.max(high[i % 3]!, points[i]!);
-  }
-  const longer = Math.max(high[0]! - low[0]!, high[1]! - low[1]!, 1e-12);
+  const { min, max } = new Box3().setFromArray(points);
+  const longer = Math.max(max.x - min.x, max.y - min.y, 1e-12);
   const width = (1 + 2 * ROOM) * longer;
-  const [left, bottom] = [(low[0]! + high[0]! - width) / 2, (low[1]! + high[1]! - width) / 2];
+  const [left, bottom] = [(min.x + max.x - width) / 2, (min.y + max.y - width) / 2];
   const heights = lowestHeights(points, triangles, left, bottom, width / TEXELS);
-  const ground = low[2]!;
+  const ground = min.z;
   const core = new Float32Array(heights.length);
   const wide = new Float32Array(heights.length);
   heights.forEach((height, i) => {

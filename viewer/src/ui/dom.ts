@@ -11,6 +11,12 @@ export function setText(element: HTMLElement, text: string): void {
   if (element.textContent !== text) element.textContent = text;
 }
 
+/** Writes a text, or hides its element where there is none. */
+export function showText(element: HTMLElement, text: string | null): void {
+  element.hidden = text === null;
+  setText(element, text ?? "");
+}
+
 /** How many CSS pixels a pixel of the design is: more on a very large screen, as the style has it. */
 export function designScale(): number {
   return Number.parseFloat(getComputedStyle(document.documentElement).fontSize) / 16;

@@ -6,7 +6,7 @@ import { grouped } from "../regions";
 import type { Group } from "../regions";
 import { ColorMap } from "../scene/color_map";
 import type { State, Store } from "../store";
-import { byId, create, press, setText } from "./dom";
+import { byId, create, press, setText, showText } from "./dom";
 import { MINUS, parseQuantity, pascals, sizeText } from "./numbers";
 
 /** Units that take over where the numbers would get long: from this value on, divided by the factor. */
@@ -39,15 +39,12 @@ export class Legend {
     };
     store.subscribe(["scene", "body"], ({ scene, body }) => {
       const { triangles = 0, drawn = null } = scene?.bodies[body] ?? {};
-      byId("legend-drawn").hidden = !drawn;
-      if (!drawn) return;
-      const [few, all] = [drawn.triangles, triangles].map((count) => count.toLocaleString("en"));
-      setText(byId("legend-drawn"), `Drawn by ${few} of ${all} triangles; felt on all.`);
+      const [few, all] = [drawn?.triangles ?? 0, triangles].map((count) => count.toLocaleString("en"));
+      showText(byId("legend-drawn"), drawn && `Drawn by ${few} of ${all} triangles; felt on all.`);
     });
     store.subscribe(["sizes", "body"], ({ sizes, body }) => {
       const sides = sizes[body];
-      byId("legend-size").hidden = !sides;
-      if (sides) setText(byId("legend-size"), `Body of ${sizeText(sides)}`);
+      showText(byId("legend-size"), sides ? `Body of ${sizeText(sides)}` : null);
     });
     store.subscribe(["layers", "coloring"], ({ layers, coloring }) => {
       const groups = coloring === "region" || coloring === "material";
@@ -84,8 +81,7 @@ export class Legend {
     if (document.activeElement !== this.max) this.max.value = (field.signed ? "+" : "") + text(max);
     press("legend-lock", locked);
     byId("legend-lock").title = locked ? "Let the range follow the largest value again" : "Keep this range";
-    byId("legend-largest").hidden = !locked;
-    setText(byId("legend-largest"), `Range locked; largest now ${text(field.largest / factor)}`);
+    showText(byId("legend-largest"), locked ? `Range locked; largest now ${text(field.largest / factor)}` : null);
   }
 
   /** With few controls there is no legend until there is something to explain: tissue that is strained, or more. */
@@ -162,5 +158,5 @@ function titleOf({ body, region }: Group, { scene, coloring, settings }: Readonl
 function entry(color: string | null, title: string): HTMLElement {
   const swatch = create("span", { className: "key key-group" });
   if (color) swatch.style.backgroundColor = color;
-  return create("p", { className: "legend-key" }, swatch, title);
+  return create("p", { className: "line" }, swatch, title);
 }

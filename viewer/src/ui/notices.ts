@@ -87,5 +87,5 @@ function showFault(fault: string | null): void {
 
 function noticeBanner(text: string, dismiss: () => void): HTMLElement {
   const close = create("button", { type: "button", className: "close", ariaLabel: "Dismiss this message", onclick: dismiss }, "×");
-  return create("div", { className: "banner banner-notice" }, create("span", {}, text), close);
+  return create("div", { className: "banner banner-notice line" }, create("span", {}, text), close);
 }

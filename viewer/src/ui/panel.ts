@@ -5,7 +5,7 @@ import { NO_INSIDE, hasInside, noCutReason } from "../control";
 import type { Viewport } from "../scene/viewport";
 import { CUT_SHARE, inControl } from "../store";
 import type { Axis, Layer, Store } from "../store";
-import { byId, disable, press, setText } from "./dom";
+import { byId, disable, press, setText, showText } from "./dom";
 import { download, takePicture } from "./screenshot";
 import { Slider } from "./slider";
 import { readStored, writeStored } from "./storage";
@@ -80,11 +80,10 @@ export class Panel {
       byId("show-cutaway").setAttribute("aria-disabled", String(!able));
       byId("show-cutaway").title = able ? "Cut open (x)" : noCutReason(scene);
       const whole = able ? scene.bodies.filter(({ tets }) => tets === 0) : [];
-      byId("cut-whole").hidden = whole.length === 0;
       byId("cut-whole").title = NO_INSIDE;
-      setText(byId("cut-whole"), `From a store, so whole: ${whole.map(({ title }) => title).join(", ")}`);
-      const several = (scene?.tools.length ?? 0) > 1;
-      byId("fingers").hidden = !several;
+      const titles = whole.map(({ title }) => title).join(", ");
+      showText(byId("cut-whole"), whole.length > 0 ? `From a store, so whole: ${titles}` : null);
+      byId("fingers").hidden = (scene?.tools.length ?? 0) <= 1;
     });
   }
 

@@ -3,7 +3,7 @@
 import { shownTool } from "../store";
 import type { State, Store } from "../store";
 import { contactsOf, deepest, feltStiffness, statedError } from "../tool_contacts";
-import { byId, setText } from "./dom";
+import { byId, setText, showText } from "./dom";
 import { MINUS, inMillimetres, newtonsPerMillimetre, percent, signed, threeDigits, wholePercent } from "./numbers";
 
 /** Linear elasticity leaves out the square of the gradient; beyond about 10 % that shows. */
@@ -51,8 +51,7 @@ export class Readout {
     byId("pinned-line").hidden = pinned.length === 0;
     const others = pinned.map((other) => threeDigits(Math.hypot(...(frame?.tools[other]?.force ?? [0]))));
     setText(this.pinned, others.join(" · "));
-    this.refused.hidden = !driven?.active || driven.refused === null;
-    if (driven?.refused) setText(this.refused, driven.refused);
+    showText(this.refused, driven?.active ? driven.refused : null);
     this.thin.hidden = !driven?.thin;
   }
 
@@ -79,20 +78,15 @@ export class Readout {
     const strain = frame?.strain ?? 0;
     setText(this.strain, (100 * strain).toFixed(1));
     const limited = frame?.tools.some((tool) => tool.limited) ?? false;
-    this.limit.hidden = !limited;
     const contacts = frame?.contacts ?? [];
     const isNonlinear = contacts.length > 0 && contacts.every(({ error }) => error !== null);
-    if (settings && limited) {
-      const at = isNonlinear ? "Held: the material's law ends here" : `Held at ${percent(settings.strain_limit)} strain`;
-      setText(this.limit, at);
-    }
+    const held = isNonlinear ? "Held: the material's law ends here" : `Held at ${percent(settings?.strain_limit ?? 0)} strain`;
+    showText(this.limit, limited ? held : null);
     const error = Math.max(0, ...contacts.map((contact) => contact.error ?? 0));
-    this.warning.hidden = isNonlinear ? error < LARGE_ERROR : strain < LINEAR_STRAIN_MAX + STRAIN_ROUNDING;
-    if (this.warning.hidden) return;
-    if (isNonlinear) {
-      setText(this.warning, `The force is known to ${wholePercent(error)} here`);
-    } else {
-      setText(this.warning, `${Math.round(100 * strain)} % strain: linear elasticity is accurate up to about 10 %`);
-    }
+    const inexact = isNonlinear ? error >= LARGE_ERROR : strain >= LINEAR_STRAIN_MAX + STRAIN_ROUNDING;
+    const warning = isNonlinear
+      ? `The force is known to ${wholePercent(error)} here`
+      : `${Math.round(100 * strain)} % strain: linear elasticity is accurate up to about 10 %`;
+    showText(this.warning, inexact ? warning : null);
   }
 }

@@ -2,18 +2,12 @@
 
 import type { ComputedSeries } from "../net/computed_messages";
 import type { Store } from "../store";
-import { byId, setText } from "./dom";
+import { byId, showText } from "./dom";
 import { duration } from "./numbers";
 
-export class SeriesNote {
-  constructor(store: Store) {
-    const note = byId("series-note");
-    store.subscribe(["computed"], ({ computed }) => {
-      const text = seriesText(computed?.series ?? null);
-      note.hidden = text === "";
-      setText(note, text);
-    });
-  }
+export function followSeries(store: Store): void {
+  const note = byId("series-note");
+  store.subscribe(["computed"], ({ computed }) => showText(note, seriesText(computed?.series ?? null) || null));
 }
 
 export function seriesText(series: ComputedSeries | null): string {

@@ -4,7 +4,7 @@
 import type { Control } from "../control";
 import { groupings } from "../regions";
 import type { State, Store } from "../store";
-import { byId, list, setText } from "./dom";
+import { byId, list, showText } from "./dom";
 import { pascals, percent } from "./numbers";
 import { Slider } from "./slider";
 
@@ -62,8 +62,7 @@ export class SettingsPanel {
     store.subscribe(["shownScale"], ({ shownScale }) => {
       this.scale.show(shownScale);
       byId("shown-scale-value").classList.toggle("warn", shownScale !== 1);
-      byId("scale-banner").hidden = shownScale === 1;
-      setText(byId("scale-banner"), `Deformation drawn ${shownScale}x`);
+      showText(byId("scale-banner"), shownScale === 1 ? null : `Deformation drawn ${shownScale}x`);
     });
     store.subscribe(["role", "scene", "body"], (state) => this.enable(state));
   }

@@ -181,7 +181,7 @@ export class SetupPanel {
     const select = create("select", { onchange: () => this.setup.chooseSegment(name, select.value) });
     select.dataset["testid"] = `segment-${name}`;
     list(select, tissues);
-    return create("label", { className: "row" }, create("span", {}, name), select);
+    return create("label", { className: "row line" }, create("span", {}, name), select);
   }
 
   private showSaved({ saved }: SetupBody): void {

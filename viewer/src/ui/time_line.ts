@@ -4,7 +4,7 @@ import type { Control } from "../control";
 import type { ReplayFrame, ReplayScene } from "../net/session_messages";
 import { Handle, Way, clock, marksOf, stepped, verdict } from "../replay";
 import type { Store } from "../store";
-import { byId, create, setText } from "./dom";
+import { byId, create, setText, showText } from "./dom";
 
 const SPEEDS: [label: string, speed: number][] = [
   ["1x", 1],
@@ -45,8 +45,7 @@ export class TimeLine {
     this.place.max = String(replay.ticks);
     byId("timeline").title = replay.path;
     setText(byId("timeline-total"), clock(replay.ticks, replay.rate));
-    byId("timeline-note").hidden = replay.note === null;
-    setText(byId("timeline-note"), replay.note ?? "");
+    showText(byId("timeline-note"), replay.note);
     const marks = marksOf(replay).map(({ place, tick, kind, text }) => {
       const named = { className: `mark mark-${kind}`, title: text, ariaLabel: text };
       const mark = create("button", { type: "button", ...named, onclick: () => this.goTo(tick) });

@@ -5,7 +5,7 @@ import { TILT_MAX, firstPosture } from "../control";
 import type { Control } from "../control";
 import { shownTool } from "../store";
 import type { State, Store } from "../store";
-import { byId, list, setText } from "./dom";
+import { byId, list, showText } from "./dom";
 import { degrees, millimetres } from "./numbers";
 import { Slider } from "./slider";
 
@@ -94,10 +94,9 @@ export class ToolPanel {
 /** Which devices move which tools. */
 function showDevices(devices: (string | null)[]): void {
   const moved = devices.flatMap((device, tool) => (device === null ? [] : [{ device, tool }]));
-  byId("device-line").hidden = moved.length === 0;
   // It tells how the pointer presses.
   if (devices.length > 0 && moved.length === devices.length) byId("hint").hidden = true;
   const several = devices.length > 1;
   const lines = moved.map(({ device, tool }) => (several ? `Tool ${tool + 1}: ${device}` : `Moved by ${device}`));
-  setText(byId("device-line"), lines.join(". "));
+  showText(byId("device-line"), moved.length > 0 ? lines.join(". ") : null);
 }

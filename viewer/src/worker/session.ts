@@ -189,15 +189,9 @@ export class WorkerSession {
     if (name === this.settings.shape[tool]) return;
     this.close();
     this.program.command({ do: "tool", tool, description: this.tools.choose(tool, name) });
-    const { settings, scene } = this;
+    const { settings } = this;
     this.settings = { ...settings, shape: settings.shape.with(tool, name as ShapeName) };
-    settings.contact_radius.forEach((radius, rank) => this.apply("contact_radius", rank, radius));
-    settings.friction.forEach((friction, rank) => this.apply("friction", rank, friction));
-    settings.youngs_modulus.forEach((modulus, body) => {
-      const first = scene.data.settings.youngs_modulus[body];
-      if (modulus !== null && first) this.apply("stiffness_scale", body, modulus / first);
-    });
-    this.apply("strain_limit", 0, settings.strain_limit);
+    this.applyAll(settings);
     [this.log, this.history, this.bodyTime] = [[], [], 0];
     this.motion = this.begin();
     this.replies.message(this.tools.sceneMessage());
@@ -208,13 +202,21 @@ export class WorkerSession {
     this.program.command({ do: "set", name, rank, value });
   }
 
+  /** Gives the loop all settings but the pace of a body, which it has at the beginning. */
+  private applyAll({ contact_radius, friction, youngs_modulus, strain_limit }: SettingsMessage): void {
+    contact_radius.forEach((radius, tool) => this.apply("contact_radius", tool, radius));
+    friction.forEach((value, tool) => this.apply("friction", tool, value));
+    youngs_modulus.forEach((modulus, body) => {
+      const first = this.scene.data.settings.youngs_modulus[body];
+      if (modulus !== null && first) this.apply("stiffness_scale", body, modulus / first);
+    });
+    this.apply("strain_limit", 0, strain_limit);
+  }
+
   private reset(): void {
     const first = this.scene.data.settings;
     this.settings.friction.forEach((_, tool) => this.program.command({ do: "release", tool }));
-    first.contact_radius.forEach((radius, tool) => this.apply("contact_radius", tool, radius));
-    first.friction.forEach((friction, tool) => this.apply("friction", tool, friction));
-    first.youngs_modulus.forEach((modulus, body) => modulus !== null && this.apply("stiffness_scale", body, 1));
-    this.apply("strain_limit", 0, first.strain_limit);
+    this.applyAll(first);
     this.program.command({ do: "reset" });
     this.settings = { ...first, time_scale: this.settings.time_scale, shape: this.settings.shape };
     this.text(this.settings);

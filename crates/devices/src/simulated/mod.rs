@@ -7,7 +7,7 @@ use triple_buffer::{Input, Output, triple_buffer};
 
 use self::hand::Hand;
 pub use self::hand::TIME_CONSTANT;
-use crate::{Buttons, Device, DeviceFault, DeviceLimits, Pose, Reading, Twist, Wrench};
+use crate::{Buttons, Device, DeviceFault, DeviceLimits, MountedDevice, Pose, Reading, Twist, Workspace, Wrench};
 
 /// Longest time for which a target goes on at its velocity, s: a pointer that says nothing more has stopped.
 const EXTRAPOLATION: f64 = 0.1;
@@ -59,6 +59,15 @@ pub struct SimulatedDevice {
 pub fn simulated() -> (Handle, SimulatedDevice) {
     let (input, output) = triple_buffer(&Target::default());
     (Handle { targets: input }, SimulatedDevice { targets: output, hand: Hand::default(), active: false, age: 0.0 })
+}
+
+/// The same, as a device for a loop, with the limits that a scene gives it.
+pub fn simulated_with(limits: &DeviceLimits) -> (Handle, Box<dyn Device>) {
+    let (handle, device) = simulated();
+    match *limits == DeviceLimits::UNLIMITED {
+        true => (handle, Box::new(device)),
+        false => (handle, Box::new(MountedDevice::new(Box::new(device), Workspace::default(), limits))),
+    }
 }
 
 impl Device for SimulatedDevice {

@@ -26,7 +26,7 @@ mod force_off {
 
 /// One device, plugged in or not.
 pub struct Device {
-    hardware: Hardware,
+    pub hardware: Hardware,
     pub model: Model,
     moved: Instant,
     /// Whether the motors are on.
@@ -108,22 +108,6 @@ impl Device {
         }
     }
 
-    pub fn has(&self, disturbance: Disturbance) -> bool {
-        self.hardware.has(disturbance)
-    }
-
-    pub fn is_open(&self) -> bool {
-        self.hardware.is_open()
-    }
-
-    pub fn is_plugged(&self) -> bool {
-        self.hardware.is_plugged()
-    }
-
-    pub fn buttons(&self) -> u32 {
-        self.hardware.buttons
-    }
-
     /// Moves to now.
     fn advance(&mut self) {
         let now = Instant::now();
@@ -162,16 +146,16 @@ impl Device {
 
     /// The error of measurements and commands.
     fn check_geometry(&self) -> Result<(), i32> {
-        if self.has(Disturbance::DriverError) { Err(error::GEOMETRY) } else { Ok(()) }
+        if self.hardware.has(Disturbance::DriverError) { Err(error::GEOMETRY) } else { Ok(()) }
     }
 
     /// What the device measures, and whether this was measured before.
     pub fn measure(&mut self) -> Result<(Tip, bool), i32> {
         self.check_geometry()?;
-        if self.has(Disturbance::ReadsFail) {
+        if self.hardware.has(Disturbance::ReadsFail) {
             return Err(error::COMMUNICATION);
         }
-        let repeated = self.measured.filter(|_| self.has(Disturbance::SlowReplies));
+        let repeated = self.measured.filter(|_| self.hardware.has(Disturbance::SlowReplies));
         let tip = repeated.unwrap_or_else(|| self.hardware.tip.measure());
         self.measured = Some(tip);
         Ok((tip, repeated.is_some()))
@@ -206,7 +190,7 @@ impl Device {
     pub fn status(&self) -> [i32; 17] {
         let mut status = [0; 17];
         (status[0], status[1]) = (1, i32::from(self.hardware.is_connected()));
-        (status[3], status[14]) = (i32::from(self.has(Disturbance::Uncalibrated)), self.force_off_cause);
+        (status[3], status[14]) = (i32::from(self.hardware.has(Disturbance::Uncalibrated)), self.force_off_cause);
         status
     }
 }

@@ -73,14 +73,14 @@ fn with(id: c_char, act: impl FnOnce(&mut Device) -> Result<c_int, c_int>) -> c_
 fn fact<R>(id: c_char, of: impl FnOnce(&Device) -> R, random: impl FnOnce(u64) -> R) -> Option<R> {
     let mut world = world();
     let fact = of(find(&mut world, id)?);
-    let nonsense = find(&mut world, id)?.has(Disturbance::Nonsense);
+    let nonsense = find(&mut world, id)?.hardware.has(Disturbance::Nonsense);
     Some(if nonsense { random(world.random.bits()) } else { fact })
 }
 
 /// Random numbers in the place of these, and a random result, if the device talks nonsense.
 fn randomize_if_disturbed(id: c_char, code: c_int, values: &mut [f64]) -> c_int {
     let mut world = world();
-    if !find(&mut world, id).is_some_and(|device| device.has(Disturbance::Nonsense)) {
+    if !find(&mut world, id).is_some_and(|device| device.hardware.has(Disturbance::Nonsense)) {
         return code;
     }
     values.fill_with(|| world.random.number(1.0));
@@ -115,18 +115,18 @@ unsafe fn put<const N: usize>(places: [*mut c_double; N], (code, values): (c_int
 
 #[unsafe(no_mangle)]
 pub extern "system" fn dhdGetDeviceCount() -> c_int {
-    world::<Device>().devices.iter().filter(|device| device.is_plugged()).count() as c_int
+    world::<Device>().devices.iter().filter(|device| device.hardware.is_plugged()).count() as c_int
 }
 
 /// Ranks count what is plugged in; numbers of open devices stay when another one is unplugged.
 #[unsafe(no_mangle)]
 pub extern "system" fn dhdOpenID(id: c_char) -> c_int {
     let mut world = world::<Device>();
-    let mut plugged = (0..world.devices.len()).filter(|rank| world.devices[*rank].is_plugged());
+    let mut plugged = (0..world.devices.len()).filter(|rank| world.devices[*rank].hardware.is_plugged());
     let wanted = usize::try_from(i8::from_ne_bytes(id.to_ne_bytes())).ok().and_then(|rank| plugged.nth(rank));
     returned(match wanted {
         None => Err(error::NO_DEVICE_FOUND),
-        Some(rank) if world.devices[rank].is_open() => Err(error::DEVICE_IN_USE),
+        Some(rank) if world.devices[rank].hardware.is_open() => Err(error::DEVICE_IN_USE),
         Some(rank) => {
             world.devices[rank].open();
             Ok(rank as c_int)
@@ -137,7 +137,7 @@ pub extern "system" fn dhdOpenID(id: c_char) -> c_int {
 #[unsafe(no_mangle)]
 pub extern "system" fn dhdClose(id: c_char) -> c_int {
     let mut world = world();
-    returned(match find(&mut world, id).filter(|device| device.is_open()) {
+    returned(match find(&mut world, id).filter(|device| device.hardware.is_open()) {
         Some(device) => {
             device.close();
             Ok(0)
@@ -169,7 +169,7 @@ pub unsafe extern "system" fn dhdGetPosition(
     let position = measured(id, |device| {
         let (tip, repeated) = device.measure()?;
         let mut position = to_vendor(tip.position);
-        if device.has(Disturbance::NotFinite) {
+        if device.hardware.has(Disturbance::NotFinite) {
             position.y = f64::NAN;
         }
         Ok((position.to_array(), if repeated { TIMEGUARD } else { 0 }))
@@ -238,7 +238,7 @@ pub extern "system" fn dhdSetForceAndTorque(
 
 #[unsafe(no_mangle)]
 pub extern "system" fn dhdGetButtonMask(id: c_char) -> c_uint {
-    fact(id, Device::buttons, |bits| bits as u32).unwrap_or(0)
+    fact(id, |device| device.hardware.buttons, |bits| bits as u32).unwrap_or(0)
 }
 
 /// No limit has been set.
@@ -273,7 +273,7 @@ pub extern "system" fn dhdGetSystemName(id: c_char) -> *const c_char {
 pub unsafe extern "system" fn dhdGetStatus(status: *mut [c_int; 17], id: c_char) -> c_int {
     let code = with(id, |_| Ok(0));
     let random = |bits: u64| std::array::from_fn(|entry| bits.rotate_left(3 * entry as u32) as c_int % 7);
-    let nonsense = fact(id, |device| device.has(Disturbance::Nonsense), |_| true) == Some(true);
+    let nonsense = fact(id, |device| device.hardware.has(Disturbance::Nonsense), |_| true) == Some(true);
     let Some(values) = fact(id, Device::status, random).filter(|_| code >= 0 || nonsense) else { return code };
     // SAFETY: by the caller.
     unsafe { status.write(values) };

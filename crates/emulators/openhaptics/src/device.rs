@@ -32,7 +32,8 @@ pub struct Snapshot {
 
 /// One device, plugged in or not.
 pub struct Device {
-    hardware: Hardware,
+    /// Open while it is initialised.
+    pub hardware: Hardware,
     /// In the vendor's setup.
     pub name: CString,
     pub model: CString,
@@ -114,18 +115,6 @@ impl Emulated for Device {
 }
 
 impl Device {
-    pub fn has(&self, disturbance: Disturbance) -> bool {
-        self.hardware.has(disturbance)
-    }
-
-    pub fn is_plugged(&self) -> bool {
-        self.hardware.is_plugged()
-    }
-
-    pub fn is_initialised(&self) -> bool {
-        self.hardware.is_open()
-    }
-
     /// Takes it for a program, with forces off, or gives it back.
     pub fn set_initialised(&mut self, initialised: bool) {
         self.hardware.set_open(initialised);

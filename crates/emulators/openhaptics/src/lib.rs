@@ -60,7 +60,7 @@ fn raise(code: u32) {
 
 /// Does something with an initialised device; errors lie on the stack.
 fn with<R>(world: &mut World<Device>, handle: u32, act: impl FnOnce(&mut Device) -> Result<R, u32>) -> Option<R> {
-    let device = world.devices.get_mut(handle as usize).filter(|device| device.is_initialised());
+    let device = world.devices.get_mut(handle as usize).filter(|device| device.hardware.is_open());
     match device.ok_or(error::BAD_HANDLE).and_then(act) {
         Ok(result) => Some(result),
         Err(code) => {
@@ -79,7 +79,7 @@ fn with_current<R>(world: &mut World<Device>, act: impl FnOnce(&mut Device) -> R
 /// Whether the current device answers with random numbers.
 fn answers_randomly(world: &World<Device>) -> bool {
     let current = world.devices.get(world.library.current as usize);
-    current.is_some_and(|device| device.has(Disturbance::Nonsense))
+    current.is_some_and(|device| device.hardware.has(Disturbance::Nonsense))
 }
 
 #[unsafe(no_mangle)]
@@ -91,13 +91,14 @@ pub unsafe extern "system" fn hdInitDevice(name: *const c_char) -> u32 {
     }
     let mut world = world::<Device>();
     let name = name.as_deref().unwrap_or(DEFAULT);
-    let found = world.devices.iter().position(|device| device.name.to_str() == Ok(name) && device.is_plugged());
+    let found =
+        world.devices.iter().position(|device| device.name.to_str() == Ok(name) && device.hardware.is_plugged());
     let Some(rank) = found else {
         world.library.raise(error::DEVICE_FAULT, INVALID_HANDLE);
         return INVALID_HANDLE;
     };
     let handle = rank as u32;
-    if world.devices[rank].is_initialised() {
+    if world.devices[rank].hardware.is_open() {
         world.library.raise(error::DEVICE_ALREADY_INITIATED, handle);
         return INVALID_HANDLE;
     }
@@ -190,7 +191,7 @@ fn transform(device: &Device) -> Vec<f64> {
     let tip = device.snapshot.tip;
     let matrix = rotation(tip.orientation, to_vendor, from_vendor);
     let mut place = 1e3 * to_vendor(tip.position);
-    if device.has(Disturbance::NotFinite) {
+    if device.hardware.has(Disturbance::NotFinite) {
         place.x = f64::NAN;
     }
     let column = |axis: DVec3, last: f64| axis.extend(last).to_array();
@@ -277,7 +278,7 @@ pub extern "system" fn hdGetErrorString(code: u32) -> *const c_char {
 
 #[unsafe(no_mangle)]
 pub extern "system" fn hdCheckCalibration() -> u32 {
-    let uncalibrated = with_current(&mut world(), |device| Ok(device.has(Disturbance::Uncalibrated)));
+    let uncalibrated = with_current(&mut world(), |device| Ok(device.hardware.has(Disturbance::Uncalibrated)));
     if uncalibrated == Some(false) { calibration::OK } else { calibration::NEEDS_MANUAL_INPUT }
 }
 
