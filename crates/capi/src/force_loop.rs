@@ -9,8 +9,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
 
 use glam::DVec3;
 use palpate_core::simulation::Pose;
+use palpate_devices::Device;
 use palpate_devices::simulated::{self, simulated_with};
-use palpate_devices::{Device, DeviceLimits};
 use palpate_scene::{BodyId, PreparedScene, ToolId, carried_over, unit_quaternion};
 use palpate_servo::{ForceLoop, LoopHandle, Published, Servo, StrainWorker, check_period};
 
@@ -155,7 +155,7 @@ impl Loop {
         if let Runner::Thread { .. } = frame.runner {
             return Err(Refusal::state("the loop's own thread runs already"));
         }
-        let (targets, devices) = frame.prepared.tools.iter().map(|_| simulated_with(&DeviceLimits::UNLIMITED)).unzip();
+        let (targets, devices) = frame.prepared.devices.iter().map(simulated_with).unzip();
         let PreparedScene { model, limits, settings, scheduling, strain, .. } = frame.prepared.clone();
         let servo = Servo::start(model, devices, limits, settings, scheduling, strain, None)?;
         // Not before: a start that is refused must not have kept the program from ticking.
@@ -192,8 +192,8 @@ impl Loop {
                 "the scene changes under the loop's own thread only: call palpate_loop_start first, or make a new loop",
             ));
         };
-        let new = |old: &Option<usize>| old.is_none().then(|| simulated_with(&DeviceLimits::UNLIMITED)).unzip();
-        let (fresh, devices) = previous_ranks.tools[..next.tools.len()].iter().map(new).unzip();
+        let tools = previous_ranks.tools.iter().zip(&next.devices);
+        let (fresh, devices) = tools.map(|(old, limits)| old.is_none().then(|| simulated_with(limits)).unzip()).unzip();
         prepared.continue_with(next, previous_ranks, Some(servo.as_mut()), devices)?;
         *targets = carried_over(std::mem::take(targets), fresh, &previous_ranks);
         *latest = servo.latest().clone();

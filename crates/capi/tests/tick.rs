@@ -19,10 +19,10 @@ use palpate::frame::{
     palpate_loop_get_rest_positions, palpate_loop_get_surface_size, palpate_loop_get_triangles,
 };
 use palpate::offline::palpate_scene_run;
-use palpate::options::{BodyOptions, SceneOptions, ToolOptions};
+use palpate::options::{BodyOptions, DeviceOptions, SceneOptions, ToolOptions};
 use palpate::scene::{
     SceneGraph, palpate_scene_add_body, palpate_scene_add_tool, palpate_scene_free, palpate_scene_get_options,
-    palpate_scene_remove_body, palpate_scene_set_options,
+    palpate_scene_remove_body, palpate_scene_set_device, palpate_scene_set_options,
 };
 use palpate::settings::palpate_loop_reset;
 use palpate::statics::palpate_store_touch;
@@ -178,29 +178,49 @@ fn a_fault_is_told_and_its_wrench_is_zero_until_a_reset() {
     assert_eq!(tick(own, 602, &at(0.005)).0, Status::PalpateOk);
 }
 
-#[test]
-fn a_thread_of_its_own_presses_by_a_simulated_hand() {
-    let fixture = Fixture::new("thread");
+/// Force along z of a simulated hand that presses by 2 mm: the first above 0.2 N, or that of the last of 2 s.
+fn pressed_by_hand(own: *mut Loop) -> f64 {
     let target =
         Target { position: [0.05, 0.05, 0.102], orientation: [0.0; 4], velocity: [0.0; 3], active: 1, grab: 0 };
     let mut frame = Frame::default();
     // SAFETY: a living loop and places.
     unsafe {
-        done(palpate_loop_start(fixture.own));
+        done(palpate_loop_start(own));
         let above = Target { position: [0.05, 0.05, 0.12], ..target };
-        done(palpate_loop_set_target(fixture.own, 0, &above));
+        done(palpate_loop_set_target(own, 0, &above));
         std::thread::sleep(std::time::Duration::from_millis(50));
-        done(palpate_loop_set_target(fixture.own, 0, &target));
+        done(palpate_loop_set_target(own, 0, &target));
         for _ in 0..200 {
             std::thread::sleep(std::time::Duration::from_millis(10));
-            done(palpate_loop_get_frame(fixture.own, &mut frame));
+            done(palpate_loop_get_frame(own, &mut frame));
             if frame.forces[0][2] > 0.2 {
                 break;
             }
         }
-        done(palpate_loop_stop(fixture.own));
+        done(palpate_loop_stop(own));
     }
-    assert!(frame.forces[0][2] > 0.2, "{:?}", frame.forces[0]);
+    frame.forces[0][2]
+}
+
+#[test]
+fn a_thread_of_its_own_presses_by_a_simulated_hand() {
+    let force = pressed_by_hand(Fixture::new("thread").own);
+    assert!(force > 0.2, "{force}");
+}
+
+#[test]
+fn the_thread_keeps_to_what_a_device_can_render() {
+    let fixture = Fixture::new("device");
+    let limits = DeviceOptions { max_force: 0.1, ..DeviceOptions::default() };
+    let mut own = null_mut();
+    // SAFETY: a living scene and a place; the loop is freed once.
+    unsafe {
+        done(palpate_scene_set_device(fixture.scene, 0, &limits));
+        done(palpate_loop_new(fixture.scene, &mut own));
+        let force = pressed_by_hand(own);
+        palpate_loop_free(own);
+        assert!((force - 0.1).abs() < 1e-9, "{force}");
+    }
 }
 
 /// Waits for a frame that is as wanted.
