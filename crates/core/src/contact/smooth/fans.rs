@@ -75,9 +75,9 @@ impl Fans {
     }
 }
 
-/// Edges of each triangle that are creases. One that ends at a node with no other crease does not part the surface there: it comes
-/// from a coarse mesh of something round, as that of a scan. The smooth surface and the drawn edge, up to a millimetre above it,
-/// would then hold the same tool at different depths.
+/// Edges of each triangle that are creases. A convex one that ends at a node with no other crease does not part the surface there:
+/// it comes from a coarse mesh of something round, as that of a scan. The smooth surface and the drawn edge, up to a millimetre
+/// above it, would then hold the same tool at different depths. No tool reaches the edge of a concave one.
 fn creases(surface: &Surface) -> Vec<[bool; 3]> {
     let cosine = |t: usize, other: u32| match other {
         u32::MAX => -1.0,
@@ -86,13 +86,17 @@ fn creases(surface: &Surface) -> Vec<[bool; 3]> {
     let edges_of = |t: usize| surface.neighbours[t].into_iter().enumerate().map(move |(k, other)| (t, k, other));
     let ends =
         |t: usize, k: usize| [surface.triangles[t][k], surface.triangles[t][(k + 1) % 3]].map(|node| node as usize);
+    let is_convex = |t: usize, k: usize, other: usize| {
+        let [from, to] = ends(t, k).map(|node| surface.positions[node]);
+        surface.normals[t].cross(surface.normals[other]).dot(to - from) > 0.0
+    };
     let mut creases = vec![[false; 3]; surface.triangles.len()];
     let (mut count, mut soft) = (vec![0u32; surface.positions.len()], Vec::new());
     for (t, k, other) in (0..creases.len()).flat_map(edges_of) {
         creases[t][k] = cosine(t, other) < CREASE;
         if creases[t][k] && (other == u32::MAX || other as usize > t) {
             ends(t, k).into_iter().for_each(|node| count[node] += 1);
-            if cosine(t, other) > SHARP_CREASE {
+            if cosine(t, other) > SHARP_CREASE && is_convex(t, k, other as usize) {
                 soft.push((t, k, other as usize));
             }
         }
