@@ -150,7 +150,7 @@ def _runs(process: int) -> bool:
     except ProcessLookupError:
         return False
     except (OSError, OverflowError):
-        # Somebody else's process; or no process at all, and no file of ours.
+        # A process of another user, or a number that no process has: such a file is not this program's.
         return True
     return True
 

@@ -132,7 +132,7 @@ def _metadata(file: Path) -> Mapping[str, Any]:
 
 
 class Limit(NamedTuple):
-    """Bytes that the cache may take, and whether somebody has set them."""
+    """Bytes that the cache may take, and whether they were set by ``palpate cache limit``."""
 
     size: int
     is_set: bool

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from strange_bodies import BODIES
 
 import palpate
 from palpate.scene import BuiltScene
-from palpate.validation.verify.contact.loop import UNLIMITED
+from palpate.validation.verify.contact.loop import UNLIMITED, loop_of
 
 UP = np.array([0.0, 0.0, 1.0])
 # The page's tools for a radius of 6 mm, the reported ones, and a sphere much smaller than an element.
@@ -67,6 +68,23 @@ def capsule_file(folder: Path) -> Path:
         mesh.apply_translation([0.0, 0.0, -3.0 - mesh.vertices[:, 2].min()])
         mesh.export(path)
     return path
+
+
+@cache
+def organ(name: str) -> tuple[palpate.Body, palpate.GreensFunction]:
+    """A built-in body of 10 kPa that stands on its lowest 8 mm."""
+    mesh = getattr(palpate.models, name)()
+    feet = mesh.nodes[:, 2].min() + 0.008
+    body = palpate.Body(mesh, material=palpate.Material(10e3, 0.45), fixed=lambda x: x[:, 2] < feet)
+    return body, palpate.precompute(body, precision="f32", progress=False)
+
+
+def organ_forces(
+    name: str, tool: Mapping[str, Any], path: np.ndarray, orientation: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0)
+) -> np.ndarray:
+    """Forces (t, 3), N, on a tool without friction that goes over an organ, its orientation w x y z not normalized."""
+    turned = np.tile(np.array(orientation) / np.linalg.norm(orientation), (len(path), 1))
+    return loop_of(*organ(name), [{**tool, "friction": 0.0}]).play(path, turned).computed_forces
 
 
 def wxyz(rotation: Rotation) -> np.ndarray:

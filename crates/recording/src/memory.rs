@@ -7,7 +7,7 @@ use palpate_servo::TickRecord;
 
 use crate::writer::{Header, TickWriter};
 
-/// Ticks in a chunk of a file that nobody waits for.
+/// Ticks in a chunk of the file: of no consequence for who reads the whole.
 const CHUNK_TICKS: u64 = 512;
 
 /// A recording in memory, up to the first tick that could not be written.
@@ -21,7 +21,7 @@ impl RecordingInMemory {
     /// An empty one.
     ///
     /// # Errors
-    /// None that memory has.
+    /// A header that cannot be written.
     pub fn new(header: Header) -> Result<Self> {
         let writer = TickWriter::new(Cursor::default(), header).map_err(|error| Error::Invalid(error.to_string()))?;
         Ok(Self { writer, ticks: 0, failed: None })

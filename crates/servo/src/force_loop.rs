@@ -68,7 +68,7 @@ impl ForceLoop {
         Self::with_clock(model, devices, limits, settings, (clock::now_ns, LOG_ROWS))
     }
 
-    /// For ticks that nobody times, with room for so many rows of the log; what prepares strain responses between them has yet to
+    /// For ticks without a clock, with room for so many rows of the log; what prepares strain responses between them has yet to
     /// be taken from the handle.
     pub(crate) fn without_clock(
         model: &Arc<Model>,

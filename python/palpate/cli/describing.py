@@ -69,7 +69,7 @@ def info(
     if is_surface(file):
         _print_surface(file, unit)
         return
-    # A size that needs asking about is what this command tells.
+    # A mesh of an unlikely size is described, not refused.
     tets = TetMesh.read(file, unit or "m")
     print(f"{file}: {mesh_line(tets)}")
     low, high = 1e3 * tets.bounds

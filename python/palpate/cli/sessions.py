@@ -243,7 +243,7 @@ def _report_text(file: Path, recording: Recording, replayed: Replayed) -> str:
 
 
 def _gap_text(recording: Recording, ticks: int) -> str:
-    """Say why a recording could not be made again to its end."""
+    """Why the last ticks of a recording were not computed again."""
     if recording.dropped is None:
         return f"note: the file was cut short, by a crash or a full disk; it has {len(recording.ticks)} ticks"
     return f"note: {recording.dropped} ticks were not recorded; what follows tick {ticks - 1} was not computed again"

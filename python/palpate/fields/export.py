@@ -184,7 +184,7 @@ class Exportable(ABC):
         Parameters
         ----------
         magnification
-            Of the displacements that are drawn; the colours tell the true ones.
+            Factor on the drawn displacements. The colours show them without it.
 
         """
         return draw(self._drawn_surfaces(), magnification, repr(self))

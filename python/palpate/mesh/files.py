@@ -339,7 +339,7 @@ def _read_first_format(path: Path) -> meshio.Mesh:
 
 
 def _gmsh_section(lines: Iterator[tuple[int, str]], name: str) -> Iterator[list[str]]:
-    """Words of the lines of a section, of which there must be as many as it says."""
+    """Words of each line of a section; its first line has their number."""
     for _, line in lines:
         if line.strip() == name:
             break

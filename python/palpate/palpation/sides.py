@@ -3,7 +3,7 @@
 A flat side gets a square lattice, as wide apart as asked, in the middle of the side. A curved side gets as many points
 as a hexagonal packing of that distance has, `A / (sqrt(3)/2 s^2)`, first each as far as possible from those before
 (Gonzalez 1985), then moved to the middle of what is closest to it (Lloyd 1982). Distances are those of places together
-with normals, so that both faces of a thin part are told apart. The same body gives the same points.
+with normals, so that both faces of a thin part are far apart. The same body gives the same points.
 """
 
 from __future__ import annotations

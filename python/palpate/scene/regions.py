@@ -240,7 +240,7 @@ class TouchTable(Table):
     @field_validator("region", "first")
     @classmethod
     def _readable(cls, area: Any) -> Any:
-        # A word alone is the name of a region, of which only the mesh file knows.
+        # A word alone names a region of the mesh file, which has not been read yet.
         if isinstance(area, str) and any(sign in area for sign in "<>="):
             with explained():
                 parse(area)

@@ -179,7 +179,7 @@ class ReplayedSimulation(Simulation):
     scene_as_built
         The scene that computes it again.
     ticks
-        How many of its ticks can be made again.
+        Ticks of the recording that can be computed again.
     ticks_done
         How many of them have been made, up to the one that is shown.
     checked

@@ -72,7 +72,7 @@ class SegmentChoice:
 class Choices:
     """What is chosen."""
 
-    unit: str | None  # of the file; None where it may be one of several and nobody has chosen yet
+    unit: str | None  # of the file; None while it may be one of several
     painted: bool  # whether the supports are those that are painted, in place of those below a plane
     plane: Plane
     tissue: str | None  # name of a material of `TISSUES`

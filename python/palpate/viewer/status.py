@@ -21,8 +21,8 @@ LOG = logging.getLogger(__name__)
 class CancellableTask:
     """A computation that a person may cancel.
 
-    It runs on a thread that nobody waits for at the end of the program. Cancelled, it stops at its next report of
-    progress; a library that gives none goes on to its end, unheard.
+    It runs on a daemon thread, which the end of the program does not wait for. Cancelled, it stops at its next report
+    of progress; a library without reports computes to its end, and the result is dropped.
     """
 
     def __init__(self) -> None:
@@ -67,7 +67,7 @@ class CancellableTask:
                 result = work()
             except BaseException as raised:
                 error = raised
-            # Nobody waits any more where the server has ended meanwhile.
+            # The loop of events is closed if the server has ended meanwhile.
             with contextlib.suppress(RuntimeError):
                 loop.call_soon_threadsafe(finish, result, error)
 

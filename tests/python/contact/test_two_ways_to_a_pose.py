@@ -8,14 +8,10 @@ into a contact as deep as it was, with all its force at once.
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 import pytest
-from crossings import polyline
+from crossings import organ_forces, polyline
 
-import palpate
-from palpate.validation.verify.contact.loop import loop_of
 from palpate.validation.verify.contact.measures import given_out
 
 STEP = 2e-5
@@ -32,35 +28,24 @@ WAYS = {
         (-0.05515, -0.10157, 0.07258),
     ),
 }
-# Of the largest force; of the largest energy; of the largest force in a tick of 20 um.
-APART, LOST, JUMP = 0.02, 0.01, 0.02
-
-
-@cache
-def pressed(name: str) -> tuple[palpate.Body, palpate.GreensFunction]:
-    mesh = getattr(palpate.models, name)()
-    feet = mesh.nodes[:, 2].min() + 0.008
-    body = palpate.Body(mesh, material=palpate.Material(10e3, 0.45), fixed=lambda x: x[:, 2] < feet)
-    return body, palpate.precompute(body, precision="f32", progress=False)
-
-
-def forces(name: str, tool: dict, path: np.ndarray, orientation=(1.0, 0.0, 0.0, 0.0)) -> np.ndarray:
-    turned = np.tile(np.array(orientation) / np.linalg.norm(orientation), (len(path), 1))
-    return np.array(loop_of(*pressed(name), [{**tool, "friction": 0.0}]).play(path, turned).computed_forces)
+# Parts of the largest force, and of the largest energy.
+APART, LOST = 0.02, 0.01
 
 
 @pytest.mark.parametrize("name", WAYS)
 def test_both_ways_give_one_force(name):
     radius, points, over = WAYS[name]
+    sphere = {"shape": "sphere", "radius": radius}
     above, deep, slid = map(np.array, points)
-    there, back = polyline([above, deep, slid], STEP), polyline([above, np.array(over), slid, deep], STEP)
-    first, second = (forces(name, {"shape": "sphere", "radius": radius}, path) for path in (there, back))
-    most = np.linalg.norm(first, axis=1).max()
-    at_deep, at_slid = (len(polyline(corners, STEP)) - 1 for corners in ([above, deep], [above, np.array(over), slid]))
-    assert np.linalg.norm(first[at_deep] - second[-1]) < APART * most
-    assert np.linalg.norm(first[-1] - second[at_slid]) < APART * most
+    there = polyline([above, deep, slid], STEP)
     whole = np.concatenate((there, there[::-1]))
-    given, energy = given_out(whole[None], forces(name, {"shape": "sphere", "radius": radius}, whole)[None])
+    forces = organ_forces(name, sphere, whole)
+    other = organ_forces(name, sphere, polyline([above, np.array(over), slid, deep], STEP))
+    most = np.linalg.norm(forces, axis=1).max()
+    at_deep, at_slid = (len(polyline(corners, STEP)) - 1 for corners in ([above, deep], [above, np.array(over), slid]))
+    assert np.linalg.norm(forces[at_deep] - other[-1]) < APART * most
+    assert np.linalg.norm(forces[len(there) - 1] - other[at_slid]) < APART * most
+    given, energy = given_out(whole[None], forces[None])
     assert abs(given[0]) < LOST * energy[0]
 
 
@@ -69,5 +54,5 @@ def test_a_tool_that_starts_inside_begins_from_no_force():
     stylus = {"shape": "capsule", "radius": 0.003, "length": 0.018}
     start, deep, slid = (-0.0007, 0.0351, 0.0258), (-0.0007, 0.0307, 0.0269), (0.0069, 0.0316, 0.0204)
     path = polyline([np.array(point) for point in (start, deep, slid)], STEP)
-    felt = forces("kidney", stylus, path, (0.1213, 0.0452, -0.6434, 0.7545))
+    felt = organ_forces("kidney", stylus, path, (0.1213, 0.0452, -0.6434, 0.7545))
     assert np.linalg.norm(np.diff(felt, axis=0), axis=1).max() < 1e-3

@@ -6,14 +6,10 @@ pressed on one place: forces jumped by up to a half, and closed paths gave out w
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 import pytest
-from crossings import polyline
+from crossings import organ_forces, polyline
 
-import palpate
-from palpate.validation.verify.contact.loop import loop_of
 from palpate.validation.verify.contact.measures import given_out
 
 CAPSULE = {"shape": "capsule", "radius": 0.004, "length": 0.014}
@@ -41,22 +37,12 @@ PATHS = {
 JUMP, LOST = 0.04, 0.06
 
 
-@cache
-def doll() -> tuple[palpate.Body, palpate.GreensFunction]:
-    mesh = palpate.models.doll()
-    feet = mesh.nodes[:, 2].min() + 0.008
-    body = palpate.Body(mesh, material=palpate.Material(10e3, 0.45), fixed=lambda x: x[:, 2] < feet)
-    return body, palpate.precompute(body, precision="f32", progress=False)
-
-
 @pytest.mark.parametrize("name", PATHS)
 def test_a_bump_is_pressed_once(name):
     tool, points, orientation = PATHS[name]
     above, deep, slid = map(np.array, points)
     path = polyline([above, deep, slid, deep, above], STEP)
-    simulation = loop_of(*doll(), [{**tool, "friction": 0.0}])
-    turned = np.array(orientation) / np.linalg.norm(orientation)
-    forces = simulation.play(path, np.tile(turned, (len(path), 1))).computed_forces
+    forces = organ_forces("doll", tool, path, orientation)
     sizes = np.linalg.norm(forces, axis=1)
     assert sizes.max() > 0.05
     assert np.linalg.norm(np.diff(forces, axis=0), axis=1).max() < JUMP * sizes.max()

@@ -4,6 +4,6 @@ mod surface;
 #[cfg(feature = "offline")]
 mod tetrahedra;
 
-pub use surface::{Faces, Surface};
+pub use surface::{Faces, Surface, is_convex};
 #[cfg(feature = "offline")]
 pub use tetrahedra::{TetMesh, Tets, node_elements, positions};

@@ -131,6 +131,11 @@ impl Surface {
     }
 }
 
+/// Whether faces with these normals turn away from each other at an edge `along` which the first has on its left.
+pub fn is_convex(first: DVec3, second: DVec3, along: DVec3) -> bool {
+    first.cross(second).dot(along) > 0.0
+}
+
 /// Pairs triangles over shared edges. Where more than two meet (bodies that touch along an edge) the pair that runs in
 /// opposite directions first in the list is joined.
 fn edge_neighbours(triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {

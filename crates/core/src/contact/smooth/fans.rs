@@ -1,19 +1,19 @@
 //! Fans: the faces around a surface node on one smooth side of it, with the quadric fitted to them.
 //!
-//! Edges that turn by more than [`CREASE`] are creases, unless they end within a smooth surface. The triangles around a node fall into fans between its creases; a
-//! node of a smooth surface has one, the corner of a cube three. A fan has a normal and a curvature of its own, from the
-//! least-squares quadric `z = a x + b y + (c x^2 + 2 d x y + e y^2) / 2` through the node and weighted by its neighbours
-//! (Cazals and Pouget, 2005).
+//! Edges that turn by more than [`CREASE`] are creases, but for convex ones that end within a smooth surface. The triangles around a
+//! node fall into fans between its creases; a node of a smooth surface has one, the corner of a cube three. A fan has a normal and a
+//! curvature of its own, from the least-squares quadric `z = a x + b y + (c x^2 + 2 d x y + e y^2) / 2` through the node and weighted
+//! by its neighbours (Cazals and Pouget, 2005).
 
 use glam::{DMat3, DVec2, DVec3};
 
 use crate::math::acos;
-use crate::mesh::Surface;
+use crate::mesh::{Surface, is_convex};
 use crate::tensor::outer;
 
 /// Cosine of the turn beyond which an edge is a crease: 50 degrees.
 const CREASE: f64 = 0.642_787_609_686_539_4;
-/// Cosine of the turn from which an edge that ends within a smooth surface is a crease too: 80 degrees.
+/// Cosine of the turn from which a convex edge that ends within a smooth surface is a crease too: 80 degrees.
 const SHARP_CREASE: f64 = 0.173_648_177_666_930_3;
 /// Reach of a fan's blending weight over its longest edge.
 const REACH: f64 = 1.8;
@@ -86,9 +86,9 @@ fn creases(surface: &Surface) -> Vec<[bool; 3]> {
     let edges_of = |t: usize| surface.neighbours[t].into_iter().enumerate().map(move |(k, other)| (t, k, other));
     let ends =
         |t: usize, k: usize| [surface.triangles[t][k], surface.triangles[t][(k + 1) % 3]].map(|node| node as usize);
-    let is_convex = |t: usize, k: usize, other: usize| {
+    let turns_away = |t: usize, k: usize, other: usize| {
         let [from, to] = ends(t, k).map(|node| surface.positions[node]);
-        surface.normals[t].cross(surface.normals[other]).dot(to - from) > 0.0
+        is_convex(surface.normals[t], surface.normals[other], to - from)
     };
     let mut creases = vec![[false; 3]; surface.triangles.len()];
     let (mut count, mut soft) = (vec![0u32; surface.positions.len()], Vec::new());
@@ -96,7 +96,7 @@ fn creases(surface: &Surface) -> Vec<[bool; 3]> {
         creases[t][k] = cosine(t, other) < CREASE;
         if creases[t][k] && (other == u32::MAX || other as usize > t) {
             ends(t, k).into_iter().for_each(|node| count[node] += 1);
-            if cosine(t, other) > SHARP_CREASE && is_convex(t, k, other as usize) {
+            if cosine(t, other) > SHARP_CREASE && turns_away(t, k, other as usize) {
                 soft.push((t, k, other as usize));
             }
         }
@@ -109,8 +109,9 @@ fn creases(surface: &Surface) -> Vec<[bool; 3]> {
             if !parts {
                 ends.into_iter().for_each(|node| count[node] -= 1);
                 creases[t][k] = false;
-                let across = surface.neighbours[other].iter().position(|&back| back as usize == t);
-                across.into_iter().for_each(|k| creases[other][k] = false);
+                if let Some(k) = surface.neighbours[other].iter().position(|&back| back as usize == t) {
+                    creases[other][k] = false;
+                }
             }
             parts
         });

@@ -22,7 +22,7 @@ pub use weights::{Blended, FanWeights, MAX_FANS};
 use self::fans::Fans;
 use self::neighbourhood::LANES;
 use crate::memory::Ranges;
-use crate::mesh::Surface;
+use crate::mesh::{Surface, is_convex};
 
 /// Fans of nodes whose normals are turned farther than this from a triangle's do not belong to it (cosine).
 const SAME_SIDE: f64 = 0.0;
@@ -131,7 +131,7 @@ impl SmoothSurface {
                     normals: [t, across[k] as usize].map(|t| surface.normals[t]),
                 };
                 let [first, second] = crease.normals;
-                (first.cross(second).dot(ends[next] - ends[k]) > 0.0).then_some(crease)
+                is_convex(first, second, ends[next] - ends[k]).then_some(crease)
             })
         })
     }

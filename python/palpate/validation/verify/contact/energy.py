@@ -1,4 +1,4 @@
-"""Energy over closed paths of a tool, of which a contact must not give out more than was put in, and sums of forces."""
+"""Energy over closed paths of a tool, and sums of forces. A contact must not give out more energy than was put in."""
 
 from __future__ import annotations
 

@@ -15,6 +15,7 @@ use glam::{DMat3, DVec3};
 use super::super::contact_plane::ContactPlane;
 use super::influence::{Grid, MAX_CELLS};
 use crate::math::{acos, sin};
+use crate::mesh::is_convex;
 
 /// Largest slope of a height.
 const STEEPEST: f64 = 3.0;
@@ -134,7 +135,7 @@ impl Wedge {
     /// Between faces with these normals, the first to the left of the edge `along`; none at a concave edge. A wedge thinner than a
     /// right angle bends as a plate, which the body's own compliance contains: it counts as a right angle.
     pub fn new(first: DVec3, second: DVec3, along: DVec3) -> Option<Self> {
-        if first.cross(second).dot(along) <= 0.0 {
+        if !is_convex(first, second, along) {
             return None;
         }
         let angle = PI - acos(first.dot(second).clamp(-1.0, 1.0));
