@@ -24,6 +24,7 @@ mod tessellation;
 mod thin;
 mod touch_patch;
 mod triangle_lists;
+mod wedge;
 
 pub(crate) use closest::barycentric;
 pub use closest::{SurfacePoint, SurfaceQuery};
@@ -32,6 +33,7 @@ pub use concavities::Concavities;
 pub use convex_corners::CornerSurface;
 pub use convex_edges::{BesideEdges, ConvexEdges};
 pub use local::SeriesFields;
+pub use modulus_share::Share;
 #[cfg(feature = "offline")]
 pub use patch::wide_patch_weights;
 pub use patch::{MAX_PATCH_NODES, Patch, PatchScratch, patch_weights};
@@ -43,3 +45,4 @@ pub use tessellation::Tessellation;
 pub use thin::{is_thin_at, thickness_for};
 pub use touch_patch::TouchPatch;
 pub(crate) use triangle_lists::TriangleLists;
+pub use wedge::{BetweenFaces, Faces};

@@ -35,7 +35,9 @@ pub struct ConvexCrease {
     pub nodes: [u32; 2],
     /// Their positions, m.
     pub ends: [DVec3; 2],
-    /// Normals of both faces, first of the one that it goes round counter-clockwise.
+    /// Drawn triangles of both faces, first of the one that it goes round counter-clockwise.
+    pub triangles: [u32; 2],
+    /// Their normals.
     pub normals: [DVec3; 2],
 }
 
@@ -128,6 +130,7 @@ impl SmoothSurface {
                 let crease = ConvexCrease {
                     nodes: [nodes[k], nodes[next]],
                     ends: [ends[k], ends[next]],
+                    triangles: [t as u32, across[k]],
                     normals: [t, across[k] as usize].map(|t| surface.normals[t]),
                 };
                 let [first, second] = crease.normals;
