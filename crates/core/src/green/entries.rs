@@ -6,7 +6,7 @@
 //!
 //! A store up to a bound is in memory as a whole. Of a larger one the square of touchable rows and columns is, which is all
 //! that contacts ask for; other rows are read from the file by position. Nothing is mapped, so a file that somebody cuts
-//! short can kill no reader: what cannot be read any more is NaN, and [`Entries::require_intact`] says beforehand why. The
+//! short can kill no reader: what cannot be read any more is NaN, and [`GreensFunction::require_intact`] says beforehand why. The
 //! file's length is compared there; should it shrink between that call and the reading, the answer is NaN, which the
 //! checks behind every answer refuse.
 
@@ -14,6 +14,7 @@ use glam::DVec3;
 use pulp::Arch;
 
 use super::columns_file::ColumnsFile;
+use super::function::GreensFunction;
 use super::node_order::{NodeOrder, TouchNode};
 use super::numbers::{AddColumns, COLUMNS_AT_ONCE, Numbers, One};
 use super::precision::Precision;
@@ -96,11 +97,6 @@ impl Entries {
         &self.magnitude
     }
 
-    /// Bound `s_i` of a row in the user's order.
-    pub fn magnitude(&self, row: usize) -> f64 {
-        self.magnitude.get(self.node_order.stored_row(row)).copied().unwrap_or(0.0)
-    }
-
     /// Hands the bytes of all columns to `put`, as first column and bytes.
     pub(super) fn each_bytes(&self, put: &mut dyn FnMut(usize, &[u8]) -> Result<()>) -> Result<()> {
         let Some(file) = &self.file else { return put(0, self.numbers.bytes()) };
@@ -110,69 +106,6 @@ impl Entries {
             put(index, &column)?;
         }
         Ok(())
-    }
-
-    /// Whether everything can still be read.
-    pub fn is_intact(&self) -> bool {
-        self.file.as_ref().is_none_or(ColumnsFile::is_intact)
-    }
-
-    /// Refuses a store that was cut short since it was loaded, where what is in memory is not all.
-    ///
-    /// # Errors
-    /// [`crate::Error::Store`].
-    pub fn require_intact(&self) -> Result<()> {
-        self.file.as_ref().map_or(Ok(()), ColumnsFile::require_intact)
-    }
-
-    /// Whether the rows of a surface node are in memory.
-    pub fn is_resident(&self, node: usize) -> bool {
-        3 * self.node_order.place(node) < self.resident
-    }
-
-    /// Entry of a row and a column in the user's order.
-    pub fn entry(&self, row: usize, column: TouchNode, axis: usize) -> f64 {
-        let (row, column) = (self.node_order.stored_row(row), 3 * column.place() + axis);
-        let value = if row < self.resident {
-            self.numbers.run(self.arch, One(column * self.resident + row))
-        } else {
-            self.read_from_file::<1>(row, column)[0]
-        };
-        // The product of the scales first: it is the same for the mirrored entry.
-        self.scale_of(row) * self.scale_of(column) * value
-    }
-
-    /// `out += factor * Psi(rows, column)` for all rows in the user's order.
-    pub fn add_column(&self, column: TouchNode, axis: usize, factor: f64, out: &mut [f64]) {
-        let column = 3 * column.place() + axis;
-        let mut sums = vec![0.0; self.rows];
-        self.add_columns(&[(column, factor * self.scale_of(column))], &mut sums);
-        let (surface, inside) = sums.split_at(3 * self.free.len());
-        for (place, (&node, sums)) in self.node_order.nodes().iter().zip(surface.chunks_exact(3)).enumerate() {
-            for (axis, sum) in sums.iter().enumerate() {
-                out[3 * node as usize + axis] += self.scale_of(3 * place + axis) * sum;
-            }
-        }
-        for (row, sum) in (surface.len()..).zip(inside) {
-            out[row] += self.scale_of(row) * sum;
-        }
-    }
-
-    /// Adds the displacements of all surface dofs (user's order, 3s) under `forces`, N; supported dofs neither take a force
-    /// nor move.
-    pub fn add_forces(&self, forces: &[(TouchNode, DVec3)], out: &mut [f64]) {
-        let of_node = |&(node, force): &(TouchNode, DVec3)| {
-            let free = self.free[node.place()];
-            (0..3).map(move |axis| (3 * node.place() + axis, free[axis] * force[axis]))
-        };
-        let columns: Vec<(usize, f64)> = forces.iter().flat_map(of_node).filter(|&(_, factor)| factor != 0.0).collect();
-        let mut sums = vec![0.0; 3 * self.free.len()];
-        self.add_columns(&columns, &mut sums);
-        for (place, (&node, sums)) in self.node_order.nodes().iter().zip(sums.chunks_exact(3)).enumerate() {
-            for axis in 0..3 {
-                out[3 * node as usize + axis] += self.free[place][axis] * sums[axis];
-            }
-        }
     }
 
     /// `sums += factor * column` over the first stored rows, for stored columns and factors; NaN where the file fails.
@@ -210,5 +143,84 @@ impl Entries {
     /// Scale of a stored row, and of the column that belongs to it.
     pub(super) fn scale_of(&self, row: usize) -> f64 {
         self.scale.get(row).copied().unwrap_or(1.0)
+    }
+}
+
+impl GreensFunction {
+    /// Bound `s_i` of a row: `|Psi_ij| <= s_i s_j`; the root of a compliance, and of a stiffness on supported rows.
+    pub fn magnitude(&self, row: usize) -> f64 {
+        let entries = &self.entries;
+        entries.magnitude.get(entries.node_order.stored_row(row)).copied().unwrap_or(0.0)
+    }
+
+    /// Whether the rows of surface node `node` are in memory, so that a tick may ask for them; those of touchable nodes are.
+    pub fn is_resident(&self, node: usize) -> bool {
+        3 * self.entries.node_order.place(node) < self.entries.resident
+    }
+
+    /// Whether everything can still be read: `false` once somebody has cut the file short. Costs a call of the system.
+    pub fn is_intact(&self) -> bool {
+        self.entries.file.as_ref().is_none_or(ColumnsFile::is_intact)
+    }
+
+    /// To be called before whole columns are read ([`Self::add_forces`], [`Self::add_column`], rows of nodes that are
+    /// not resident): they are NaN where the file has been cut short.
+    ///
+    /// # Errors
+    /// [`crate::Error::Store`] for a file that was cut short while in use.
+    pub fn require_intact(&self) -> Result<()> {
+        self.entries.file.as_ref().map_or(Ok(()), ColumnsFile::require_intact)
+    }
+
+    /// Entry of row `row` and column `column`.
+    pub fn entry(&self, row: usize, column: usize) -> f64 {
+        let entries = &self.entries;
+        let (row, column) = (entries.node_order.stored_row(row), self.stored_column(column));
+        let value = if row < entries.resident {
+            entries.numbers.run(entries.arch, One(column * entries.resident + row))
+        } else {
+            entries.read_from_file::<1>(row, column)[0]
+        };
+        // The product of the scales first: it is the same for the mirrored entry.
+        entries.scale_of(row) * entries.scale_of(column) * value
+    }
+
+    /// `out += factor * Psi(:, column)`, on all rows.
+    pub fn add_column(&self, column: usize, factor: f64, out: &mut [f64]) {
+        let (entries, column) = (&self.entries, self.stored_column(column));
+        let mut sums = vec![0.0; entries.rows];
+        entries.add_columns(&[(column, factor * entries.scale_of(column))], &mut sums);
+        let (surface, inside) = sums.split_at(3 * entries.free.len());
+        for (place, (&node, sums)) in entries.node_order.nodes().iter().zip(surface.chunks_exact(3)).enumerate() {
+            for (axis, sum) in sums.iter().enumerate() {
+                out[3 * node as usize + axis] += entries.scale_of(3 * place + axis) * sum;
+            }
+        }
+        for (row, sum) in (surface.len()..).zip(inside) {
+            out[row] += entries.scale_of(row) * sum;
+        }
+    }
+
+    /// Adds `Psi f` to the displacements (m) of all surface dofs (3s) for forces on nodes, N; supported dofs take no force
+    /// and do not move. Made for frames: each column is read once, in the order of the store.
+    pub fn add_forces(&self, forces: &[(TouchNode, DVec3)], out: &mut [f64]) {
+        let entries = &self.entries;
+        let of_node = |&(node, force): &(TouchNode, DVec3)| {
+            let free = entries.free[node.place()];
+            (0..3).map(move |axis| (3 * node.place() + axis, free[axis] * force[axis]))
+        };
+        let columns: Vec<(usize, f64)> = forces.iter().flat_map(of_node).filter(|&(_, factor)| factor != 0.0).collect();
+        let mut sums = vec![0.0; 3 * entries.free.len()];
+        entries.add_columns(&columns, &mut sums);
+        for (place, (&node, sums)) in entries.node_order.nodes().iter().zip(sums.chunks_exact(3)).enumerate() {
+            for axis in 0..3 {
+                out[3 * node as usize + axis] += entries.free[place][axis] * sums[axis];
+            }
+        }
+    }
+
+    /// Column of the store for a column in the user's order.
+    fn stored_column(&self, column: usize) -> usize {
+        self.entries.node_order.stored_row(self.row_of_column(column))
     }
 }

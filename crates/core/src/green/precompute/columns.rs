@@ -5,15 +5,13 @@
 
 use std::sync::Arc;
 
-use super::block::Block;
 use super::factorization::{Factorization, RequestedPrecision, Sweeps, factorize};
-use super::layout::Layout;
-use super::phase::PhaseCallback;
+use super::layout::{Block, Layout};
 use super::plan::SymbolicAnalysis;
 use super::problem::Problem;
 use super::sweep::Scratch;
 use super::system::System;
-use super::tasks::task_failed;
+use super::tasks::{PhaseCallback, task_failed};
 use super::tree::Reading;
 use crate::Result;
 use crate::fem::{Supports, SymmetricCsc};

@@ -14,9 +14,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use rayon::prelude::*;
 
-use super::block::Block;
 use super::claim::Claim;
-use super::layout::Layout;
+use super::layout::{Block, Layout};
 use crate::positioned::Positioned;
 use crate::{Error, Result};
 

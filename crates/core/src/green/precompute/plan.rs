@@ -2,15 +2,14 @@
 
 use rayon::current_num_threads;
 
-use super::block::Block;
-use super::layout::Layout;
+use super::layout::{Block, Layout};
 use super::mirror;
 use super::operators::operator_numbers;
-use super::phase::{Phase, PhaseCallback};
 use super::probe;
 use super::problem::Problem;
 use super::sweep::{loaded, scratch_numbers};
 use super::system::System;
+use super::tasks::{Phase, PhaseCallback};
 use super::tree::Tree;
 use crate::fem::SymmetricCsc;
 use crate::green::precision::Precision;

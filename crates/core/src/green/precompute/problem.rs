@@ -1,5 +1,7 @@
 //! The reference problem: a supported body, and the key of its Green's function.
 
+use glam::DVec3;
+
 use crate::Result;
 use crate::fem::{Isotropic, Supports};
 use crate::green::key::ContentKey;
@@ -49,14 +51,18 @@ impl Problem {
         TouchKey { before: key, loads: self.loads.clone() }
     }
 
+    /// Rest positions of the surface nodes, m.
+    pub fn surface_positions(&self) -> Vec<DVec3> {
+        self.surface_nodes.iter().map(|&n| self.mesh.nodes[n as usize]).collect()
+    }
+
     /// The surface in its own numbering.
     ///
     /// # Errors
     /// Faces of nodes that are not on the surface.
     pub fn surface(&self) -> Result<Surface> {
         let local = |n: u32| self.surface_nodes.binary_search(&n).ok().map(|i| i as u32);
-        let positions = self.surface_nodes.iter().map(|&n| self.mesh.nodes[n as usize]).collect();
-        Surface::new(positions, self.surface_faces.renumbered(local)?)
+        Surface::new(self.surface_positions(), self.surface_faces.renumbered(local)?)
     }
 
     /// Dof of every row: the surface's, then the supported ones inside.

@@ -1,7 +1,6 @@
 //! Solution of one block of columns, from its loads to its panel.
 
-use super::block::Block;
-use super::layout::Layout;
+use super::layout::{Block, Layout};
 use super::number::Number;
 use super::sweep::{Scratch, Sweep, loaded};
 use super::tree::Tree;
