@@ -5,8 +5,6 @@
 //! a factor smaller than that of the body, far too long for the force loop, short enough for a frame.
 
 use faer::Par;
-use faer::dyn_stack::MemBuffer;
-use faer::mat::MatMut;
 
 use crate::fem::{Supports, SymmetricCsc};
 use crate::solver::Factor;
@@ -120,8 +118,8 @@ impl Interior {
             self.load(field, loaded, right);
         }
         // One solve for all fields: the factor, which is larger than the caches, is read once.
-        let mut memory: MemBuffer = factor.solve_scratch(count);
-        factor.solve_in_place(MatMut::from_column_major_slice_mut(&mut right, rows, count), &mut memory);
+        let mut memory = factor.solve_scratch(count);
+        factor.solve_in_place(&mut right, &mut memory);
         for (field, right) in all.chunks_exact_mut(self.dof_count).zip(right.chunks_exact(rows)) {
             for (&dof, &u) in self.inner.iter().zip(right) {
                 field[dof as usize] = u;

@@ -35,6 +35,7 @@ pub use function::GreensFunction;
 #[cfg(feature = "offline")]
 pub use interior::Interior;
 pub use key::FORMAT_VERSION;
+pub(crate) use key::add_sections;
 #[cfg(all(feature = "strain", not(feature = "offline")))]
 pub use no_interior::Interior;
 pub use node_order::TouchNode;

@@ -5,16 +5,14 @@
 //! space, and all numbers by planes of bytes: what a general compressor makes small. The numbers themselves are those of the
 //! store, so that forces are the same to the bit.
 
-use std::path::Path;
-
 use safetensors::tensor::{Dtype, SafeTensors};
 
 use super::entries::Entries;
 use super::function::GreensFunction;
 use super::numbers::Numbers;
 use super::precision::Precision;
-use super::store_writer::Header;
-use crate::{Error, Result};
+use super::store_writer::header_of;
+use crate::Result;
 
 /// The block that stands for the operator.
 pub(super) const BLOCK: &str = "packed";
@@ -31,7 +29,7 @@ impl GreensFunction {
         self.require_intact()?;
         let block = self.entries.packed();
         let small = self.small_tensors();
-        let mut header = Header::new(self, self.precision());
+        let mut header = header_of(self, self.precision());
         header.text(SUM, blake3::hash(&block).to_hex().as_str());
         header.tensor(BLOCK, Dtype::U8, &[block.len()], block.len());
         for (name, dtype, shape, data) in &small {
@@ -182,9 +180,4 @@ fn zigzag(difference: u16) -> u16 {
 
 fn unzigzag(word: u16) -> u16 {
     (word >> 1) ^ (word & 1).wrapping_neg()
-}
-
-/// What a damaged block is called.
-pub(super) fn damaged(path: &Path) -> Error {
-    Error::Store { path: path.to_owned(), reason: "is damaged (its packed numbers); write it again".into() }
 }

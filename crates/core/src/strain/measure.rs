@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::loading::{Loadings, loadings};
+use super::loading::loadings;
 use super::response::{MAX_CONTACTS_WATCHED, Place, StrainResponse};
 use super::watched_points::choose;
 use super::{GradientOperator, StrainKind};
@@ -88,8 +88,9 @@ impl StrainMeasure {
             return Err(Error::Invalid(format!("the limit of strain must be positive, got {limit}")));
         }
         let loaded = green.free_response.iter().any(|&u| u != 0.0);
-        let Loadings { directions, both_signs } = loadings(patches.len(), loaded || self.kind == StrainKind::InPlane);
-        let chosen = choose(self.kind, patches.len(), &places, &directions, both_signs, limit);
+        // Then a loading turned round strains differently, and counts as another one.
+        let both_signs = loaded || self.kind == StrainKind::InPlane;
+        let chosen = choose(self.kind, patches.len(), &places, &loadings(patches.len()), both_signs, limit);
         Ok(StrainResponse::new(self.kind, patches.len(), &chosen))
     }
 

@@ -236,7 +236,7 @@ impl Partial {
                 "another program has changed its finished columns in {}; run the same command again to compute them anew",
                 self.claim.path().display()
             );
-            Err(Error::Store { path: self.claim.target().to_owned(), reason })
+            Err(Error::store(self.claim.target(), reason))
         })
     }
 
