@@ -8,7 +8,6 @@
 //! the drawn surface below a tool, `taxels` the pressures on a tool.
 
 mod body;
-mod contact_check;
 mod contacts;
 mod energy;
 mod indented;
@@ -21,9 +20,7 @@ mod model;
 mod motion;
 mod passivity;
 mod previous_ranks;
-mod rotation;
 mod scratch;
-mod series_take_up;
 mod slip;
 mod snapshot;
 mod solve;
@@ -36,7 +33,6 @@ mod system;
 mod taxels;
 mod time;
 mod tool;
-mod weight_scratch;
 
 pub use body::{BodyDynamics, BodyModel, PreparedBody};
 pub use contacts::{Contact, Contacts, Mode};
