@@ -145,7 +145,7 @@ impl ColumnStore {
             "{{\"format\":\"palpate-partial\",\"version\":{FORMAT_VERSION},\"key\":\"{}\",\"bytes\":{kind},\"width\":{width}}}\n",
             green.key
         );
-        let path = claim.target().to_owned();
+        let path = claim.target.clone();
         let (partial, discarded) = Partial::open(claim, &header, &parts.layout, kind)?;
         let key = problem.key_of_touch(target.precision.named());
         let previous = PreviousWork { resumed: 0, discarded };
