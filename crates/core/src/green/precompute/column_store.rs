@@ -172,7 +172,7 @@ impl ColumnStore {
     pub fn first_unfinished(&self) -> Option<UnfinishedStage> {
         let missing = self.missing();
         let stage = self.parts.layout.stage_of(self.blocks[*missing.first()?].first);
-        let Stage { supports, forces } = self.parts.layout.stages()[stage].clone();
+        let Stage { supports, forces } = self.parts.layout.stages[stage].clone();
         let blocks = missing.into_iter().take_while(|&block| self.blocks[block].first < forces.end).collect();
         Some(UnfinishedStage { first: supports.start, end: forces.end, blocks })
     }

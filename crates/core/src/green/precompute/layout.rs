@@ -28,8 +28,8 @@ pub struct Layout {
     ranks: Vec<u32>,
     /// Place of each rank with a column.
     places: Vec<u32>,
-    /// The columns by stages.
-    stages: Vec<Stage>,
+    /// The columns by stages, in their order.
+    pub stages: Vec<Stage>,
     /// For each dof its rank, or [`NONE`].
     rank_of_dof: Vec<u32>,
     /// Permuted position of each free dof.
@@ -196,11 +196,6 @@ impl Layout {
     /// Number of rows.
     pub fn rows(&self) -> usize {
         self.row_of_rank.len()
-    }
-
-    /// The stages, in their order.
-    pub fn stages(&self) -> &[Stage] {
-        &self.stages
     }
 
     /// Stage of a place.
