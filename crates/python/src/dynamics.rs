@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use faer::{MatMut, Par};
+use faer::Par;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use palpate_core::dynamics::{
     Basis, Direct, DirectScratch, DirectState, Energy, EnergyAccount, Integration, Lanes, ModalModel, ModalState,

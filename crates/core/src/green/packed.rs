@@ -55,7 +55,7 @@ impl Layout {
     fn of(entries: &Entries) -> Self {
         let dofs = (0..entries.free.len()).flat_map(|place| (0..3).map(move |axis| (place, axis)));
         let free = dofs.filter(|&(place, axis)| entries.free[place][axis] != 0.0).map(|(place, axis)| 3 * place + axis);
-        let end = 3 * entries.node_order().touchable_count();
+        let end = 3 * entries.node_order.touchable_count();
         let (square, below) = free.partition(|&row| row < end);
         Self { square, below }
     }
@@ -104,7 +104,7 @@ impl Entries {
     fn predicted(&self, layout: &Layout, rank: usize, row: usize, word: impl Fn(usize, usize) -> u64) -> u64 {
         match rank.checked_sub(AXES) {
             // Above the diagonal of that column, or below the square: read before.
-            Some(before) if row <= layout.square[before] || row >= 3 * self.node_order().touchable_count() => {
+            Some(before) if row <= layout.square[before] || row >= 3 * self.node_order.touchable_count() => {
                 word(row, layout.square[before])
             }
             _ => 0,
@@ -138,7 +138,7 @@ impl Entries {
         if planes.len() != count * width {
             return None;
         }
-        let square_end = 3 * self.node_order().touchable_count();
+        let square_end = 3 * self.node_order.touchable_count();
         let mut numbers = std::mem::replace(&mut self.numbers, Numbers::zeros(Precision::F16, 0));
         let mut at = 0;
         layout.each(|rank, row| {

@@ -241,7 +241,7 @@ impl<'a> Reader<'a> {
         }
         let rows = 3 * green.surface_nodes.len();
         let numbers = Numbers::try_zeros(precision, 3 * green.touch.len() * rows)?;
-        let (node_order, magnitude) = (green.entries.node_order().clone(), green.entries.magnitudes()[..rows].to_vec());
+        let (node_order, magnitude) = (green.entries.node_order.clone(), green.entries.magnitude[..rows].to_vec());
         let mut entries = Entries::new(node_order, &green.row_is_fixed[..rows], magnitude, numbers, None);
         entries.unpack(&block).ok_or_else(damaged)?;
         Ok(entries)
@@ -253,7 +253,7 @@ impl<'a> Reader<'a> {
         if psi.shape != [columns, green.rows] {
             return Err(self.damaged("the operator's shape does not match the body"));
         }
-        let (node_order, magnitude) = (green.entries.node_order().clone(), green.entries.magnitudes().to_vec());
+        let (node_order, magnitude) = (green.entries.node_order.clone(), green.entries.magnitude.to_vec());
         let at = self.start + psi.data_offsets.0 as u64;
         let (column, head) = (green.rows * precision.bytes(), columns * precision.bytes());
         let length = columns * column;

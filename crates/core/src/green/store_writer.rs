@@ -124,7 +124,7 @@ impl GreensFunction {
         let s = &self.surface;
         let (faces, face_nodes) = (s.faces.as_flattened(), s.faces.nodes_per_face());
         let fixed: Vec<u8> = self.row_is_fixed.iter().map(|&b| u8::from(b)).collect();
-        let stored = self.entries.node_order().nodes();
+        let stored = self.entries.node_order.nodes();
         let mut tensors = vec![
             ("surface_nodes", Dtype::U32, vec![self.surface_nodes.len()], bytes(&self.surface_nodes)),
             ("surface_positions", Dtype::F64, vec![s.positions.len(), 3], bytemuck::cast_slice(&s.positions).to_vec()),
@@ -140,7 +140,7 @@ impl GreensFunction {
                 tensors.push((name, Dtype::F64, vec![values.len()], bytemuck::cast_slice(values).to_vec()));
             }
         }
-        let magnitude = self.entries.magnitudes();
+        let magnitude = &self.entries.magnitude;
         let accuracy = self.accuracy.to_array();
         tensors.push(("accuracy", Dtype::F64, vec![accuracy.len()], bytemuck::cast_slice(&accuracy).to_vec()));
         tensors.insert(0, ("magnitude", Dtype::F64, vec![magnitude.len()], bytemuck::cast_slice(magnitude).to_vec()));

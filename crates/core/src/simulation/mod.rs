@@ -21,6 +21,7 @@ mod motion;
 mod passivity;
 mod previous_ranks;
 mod scratch;
+mod series_take_up;
 mod slip;
 mod snapshot;
 mod solve;
@@ -33,6 +34,7 @@ mod system;
 mod taxels;
 mod time;
 mod tool;
+mod weight_scratch;
 
 pub use body::{BodyDynamics, BodyModel, PreparedBody};
 pub use contacts::{Contact, Contacts, Mode};

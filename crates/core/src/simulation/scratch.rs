@@ -3,9 +3,7 @@
 use super::law::{LocalScratch, TickMemory};
 use super::model::Model;
 use super::system::System;
-use crate::contact::footprint::FootprintScratch;
-use crate::contact::smooth::{FanWeights, Neighbourhood};
-use crate::contact::{Patch, PatchScratch};
+use super::weight_scratch::WeightScratch;
 
 /// Reusable memory of [`super::step`]. Only copies of parts of the model outlive a tick in it.
 pub struct Scratch {
@@ -34,32 +32,4 @@ impl Scratch {
     pub fn newton_steps(&self) -> usize {
         self.local.newton_steps
     }
-}
-
-/// Memory for the weights of the nodes below a contact, of all bodies.
-pub struct WeightScratch {
-    /// By body.
-    pub patches: Vec<PatchScratch>,
-    /// The latest patch.
-    pub candidate: Patch,
-    /// Fans near a sphere.
-    pub near: Neighbourhood,
-    /// Pieces near a tool that is not a sphere, and the weights of its fans.
-    pub footprint: FootprintScratch,
-    pub weights: FanWeights,
-}
-
-impl WeightScratch {
-    /// For a model.
-    pub fn new(model: &Model) -> Self {
-        let patches = model.bodies.iter().map(|body| PatchScratch::new(&body.green.surface)).collect();
-        let near = neighbourhood(model);
-        let (footprint, weights) = (FootprintScratch::default(), FanWeights::new(near.clone()));
-        Self { patches, candidate: Patch::default(), near, footprint, weights }
-    }
-}
-
-/// Memory for the smooth surfaces of a model.
-pub fn neighbourhood(model: &Model) -> Neighbourhood {
-    Neighbourhood::new(model.bodies.iter().filter_map(|body| body.local.as_ref()).map(|local| &local.smooth))
 }

@@ -3,8 +3,9 @@
 use super::body::TIME_STEPS;
 use super::input::{Controls, Input};
 use super::model::Model;
-use super::scratch::{Scratch, WeightScratch};
+use super::scratch::Scratch;
 use super::state::State;
+use super::weight_scratch::WeightScratch;
 use crate::contact::patch_weights;
 
 /// Begins a strike that the input requests, if there is room for it (`State::has_room_for_strike`).

@@ -5,10 +5,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::arrangement::Arrangement;
 use super::columns::AssembledProblem;
-use super::layout::{Block, Layout, runs};
+use super::layout::{Block, runs};
 use super::number::Number;
 use super::panels::Panels;
-use super::scales::quantise;
 use super::tasks::in_tasks;
 use crate::Result;
 use crate::green::entries::scales;
@@ -28,17 +27,12 @@ pub struct Mirror<'a, T> {
     pub tasks: usize,
 }
 
-/// Numbers that one task of [`Mirror::columns`] needs.
-pub fn numbers(layout: &Layout, width: usize) -> usize {
-    (2 * width + 1) * layout.rows()
-}
-
 /// Rows of a panel that are read at a time, at most.
 const ROWS_AT_ONCE: usize = 256;
 
 impl<T: Number> Mirror<'_, T> {
     /// Calls `put(column of the store, bytes)` for every column, from several tasks at a time. `magnitude` are the bounds of
-    /// the stored rows.
+    /// the stored rows. A task has `2 width + 1` numbers a row in memory, as the plan counts them.
     ///
     /// # Errors
     /// That of reading a panel, or of `put`.
@@ -189,5 +183,13 @@ fn transpose_into<T: Number>(panel: &[T], width: usize, lines: &mut [T], length:
                 }
             }
         }
+    }
+}
+
+/// `q` of a column from its entries, the inverse scales being given.
+fn quantise<T: Number>(column: &[T], column_inverse: f64, row_inverses: &[f64], out: &mut [i16]) {
+    for ((q, value), inverse) in out.iter_mut().zip(column).zip(row_inverses) {
+        // The conversion saturates, where rounding has crossed the bound.
+        *q = (value.to_f64() * (inverse * column_inverse)).round() as i16;
     }
 }

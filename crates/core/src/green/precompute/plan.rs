@@ -3,7 +3,6 @@
 use rayon::current_num_threads;
 
 use super::layout::{Block, Layout};
-use super::mirror;
 use super::operators::operator_numbers;
 use super::probe;
 use super::problem::Problem;
@@ -202,7 +201,8 @@ impl Sizes {
     fn peak(&self, layout: &Layout, tree: &Tree, width: usize, tasks: usize) -> usize {
         let panel = self.stored * width * layout.rows();
         let solving = self.operators + tasks * (self.computed * scratch_numbers(tree, width) + panel);
-        let mirroring = tasks * self.stored * mirror::numbers(layout, width);
+        // By `Mirror::columns`.
+        let mirroring = tasks * self.stored * (2 * width + 1) * layout.rows();
         self.matrix + self.result + self.factorising.max(self.probing).max(solving).max(mirroring)
     }
 

@@ -41,11 +41,3 @@ pub fn magnitudes<T: Number>(mirror: &Mirror<'_, T>) -> Result<Vec<f64>> {
     }
     Ok(mirror.arrangement.rank_of_stored.iter().map(|&rank| of_rank[rank as usize]).collect())
 }
-
-/// `q` of a column from its entries, the inverse scales being given.
-pub fn quantise<T: Number>(column: &[T], column_inverse: f64, row_inverses: &[f64], out: &mut [i16]) {
-    for ((q, value), inverse) in out.iter_mut().zip(column).zip(row_inverses) {
-        // The conversion saturates, where rounding has crossed the bound.
-        *q = (value.to_f64() * (inverse * column_inverse)).round() as i16;
-    }
-}

@@ -5,10 +5,10 @@ use crate::contact::Refusal;
 use crate::simulation::contacts::Contact;
 use crate::simulation::input::Controls;
 use crate::simulation::model::Model;
-use crate::simulation::scratch::WeightScratch;
 use crate::simulation::solve::add_contact;
 use crate::simulation::state::{EntryDepth, State};
 use crate::simulation::tool::LawKind;
+use crate::simulation::weight_scratch::WeightScratch;
 
 /// A contact law, its methods in the order of a tick. It stores nothing: its state is in contacts, its memory in [`TickMemory`].
 ///

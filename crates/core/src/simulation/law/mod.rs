@@ -21,9 +21,9 @@ pub use local::LocalScratch;
 
 use super::contacts::Contact;
 use super::model::Model;
-use super::scratch::WeightScratch;
 use super::system::System;
 use super::tool::LawKind;
+use super::weight_scratch::WeightScratch;
 
 /// All laws. The first, a sticking patch, replaces a law that is missing in this build.
 pub const LAWS: &[&dyn Law] = &[

@@ -4,8 +4,8 @@
 use super::Approach;
 use super::stick::Footprint;
 use crate::contact::{Refusal, SurfacePoint};
-use crate::simulation::scratch::WeightScratch;
 use crate::simulation::tool::LawKind;
+use crate::simulation::weight_scratch::WeightScratch;
 
 impl LawKind {
     /// The contact of Jun, Choi and Cho: the node closest to where the tool first touched.

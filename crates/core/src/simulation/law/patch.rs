@@ -3,8 +3,8 @@
 use super::Approach;
 use super::stick::Footprint;
 use crate::contact::{Refusal, SurfacePoint, patch_weights};
-use crate::simulation::scratch::WeightScratch;
 use crate::simulation::tool::LawKind;
+use crate::simulation::weight_scratch::WeightScratch;
 
 impl LawKind {
     /// A smooth patch of a physical radius that sticks to the material it first touched.

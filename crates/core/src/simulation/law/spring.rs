@@ -9,9 +9,9 @@ use crate::contact::Refusal;
 use crate::simulation::contacts::{Contact, Mode};
 use crate::simulation::input::Controls;
 use crate::simulation::model::Model;
-use crate::simulation::scratch::WeightScratch;
 use crate::simulation::state::{EntryDepth, State};
 use crate::simulation::tool::LawKind;
+use crate::simulation::weight_scratch::WeightScratch;
 
 /// Force over depth, N/m.
 const STIFFNESS: f64 = 200.0;

@@ -10,9 +10,9 @@ use glam::DVec3;
 use super::{Approach, Law};
 use crate::contact::{Refusal, SurfacePoint};
 use crate::simulation::contacts::{Contact, Mode};
-use crate::simulation::scratch::WeightScratch;
 use crate::simulation::state::EntryDepth;
 use crate::simulation::tool::LawKind;
+use crate::simulation::weight_scratch::WeightScratch;
 
 /// A grab reaches this many tool radii from the surface.
 const GRAB_REACH: f64 = 2.0;

@@ -2,8 +2,8 @@
 
 use crate::simulation::contacts::Contact;
 use crate::simulation::model::Model;
-use crate::simulation::scratch::WeightScratch;
 use crate::simulation::state::State;
+use crate::simulation::weight_scratch::WeightScratch;
 
 /// Adds a new contact whose patch is `weight_scratch.candidate`: its slot, its compliance with every other contact of the body
 /// and, on a body in motion, the displacement of the patch at the start. Returns the slot. `None` if a node is not touchable; the

@@ -51,9 +51,9 @@ use crate::simulation::body::LocalSurface;
 use crate::simulation::contacts::{Contact, LocalContact, STRAIN_REQUESTS};
 use crate::simulation::input::Controls;
 use crate::simulation::model::Model;
-use crate::simulation::scratch::WeightScratch;
 use crate::simulation::state::{EntryDepth, State};
 use crate::simulation::tool::LawKind;
+use crate::simulation::weight_scratch::WeightScratch;
 
 /// Longest motion of a tool in a tick, over its radius: beyond it the tool has jumped, and its contact ends.
 const JUMP: f64 = 2.0;

@@ -11,8 +11,8 @@ use crate::contact::smooth::{FanWeights, FootPoint, SmoothSurface};
 use crate::math::pow;
 use crate::simulation::MAX_CONTACTS;
 use crate::simulation::model::Model;
-use crate::simulation::scratch::neighbourhood;
 use crate::simulation::state::BodyState;
+use crate::simulation::weight_scratch::neighbourhood;
 use crate::tensor::outer;
 
 /// After a step that increases the residual, for tools with pressure cells, the next one from the same position is no longer than

@@ -35,11 +35,11 @@ use crate::simulation::contacts::{Contact, Mode, gathered};
 use crate::simulation::input::Controls;
 use crate::simulation::law::TickMemory;
 use crate::simulation::model::Model;
-use crate::simulation::scratch::WeightScratch;
 use crate::simulation::solve::contact_displacement;
 use crate::simulation::state::{EntryDepth, State};
 use crate::simulation::system::System;
 use crate::simulation::tool::LawKind;
+use crate::simulation::weight_scratch::WeightScratch;
 use crate::tensor::outer;
 
 /// Residual, over the tool's thickness, beyond which the tool may have left the body: the last evaluation is at the position
