@@ -28,6 +28,9 @@ pub fn symmetric([xx, xy, xz, yy, yz, zz]: [f64; 6]) -> DMat3 {
 /// Shortest rotation in the world that takes one orientation to another, rad along its axis. By the arctangent: the
 /// arccosine of `w` would lose half of the digits of a small angle.
 pub fn rotation_vector(from: DQuat, to: DQuat) -> DVec3 {
+    if from == to {
+        return DVec3::ZERO;
+    }
     let turn = to * from.conjugate();
     let turn = if turn.w < 0.0 { -turn } else { turn };
     let sine = turn.xyz().length();

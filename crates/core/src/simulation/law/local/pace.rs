@@ -27,18 +27,19 @@ pub struct Pace {
     pub cells: bool,
     /// Radius of the tool, or thickness of one with pressure cells, m.
     pub radius: f64,
-    pub secant: Secant,
+    /// Whether steps have gone to and fro, so that secant corrections are on.
+    narrows: bool,
     snaps: bool,
 }
 
 impl Pace {
     pub fn new(cells: bool, radius: f64) -> Self {
-        Self { cells, radius, secant: Secant::default(), snaps: false }
+        Self { cells, radius, narrows: false, snaps: false }
     }
 
     /// Most steps, and those after which they are shortened.
     fn steps(&self) -> [usize; 2] {
-        match (self.snaps, self.secant.is_on, self.cells) {
+        match (self.snaps, self.narrows, self.cells) {
             (true, _, _) => SNAP_STEPS,
             (_, true, _) => SECANT_STEPS,
             (.., true) => [MOST_CELL_STEPS, USUAL_STEPS[1]],
@@ -54,16 +55,24 @@ impl Pace {
     ///
     /// With higher orders of the body's displacement nothing is learned from residuals: their slope follows the force too slowly, so
     /// that the residual at a position depends on the steps before.
-    pub fn observe(&mut self, step: usize, whole: &[DVec3], unstable: bool, responses: &[LocalResponse]) {
+    pub fn observe(
+        &mut self,
+        step: usize,
+        unstable: bool,
+        whole: &[DVec3],
+        responses: &[LocalResponse],
+        secant: &mut Secant,
+    ) {
         self.snaps |= unstable;
         if !self.cells && !responses.iter().any(LocalResponse::has_higher_orders) {
-            self.secant.compare(step, whole);
+            secant.compare(step, whole);
+            self.narrows = secant.is_on;
         }
     }
 
     /// Share of the whole steps that is taken. The longest of them, m, becomes no longer than `bound`, m.
     pub fn share(&self, step: usize, longest: f64, bound: f64) -> f64 {
-        let (narrows, usual) = (self.secant.is_on && !self.snaps, self.steps()[1]);
+        let (narrows, usual) = (self.narrows && !self.snaps, self.steps()[1]);
         let bound = bound.min(if narrows { LONGEST_SECANT_STEP } else { LONGEST_STEP } * self.radius);
         let shortened = match step < usual {
             true => 1.0,
@@ -75,7 +84,7 @@ impl Pace {
 
     /// Whether the method has diverged, by the longest of its last whole steps, m.
     pub fn has_diverged(&self, longest: f64) -> bool {
-        let allowed = if self.secant.is_on { EDGE_STEP } else { DIVERGED_STEP };
+        let allowed = if self.narrows { EDGE_STEP } else { DIVERGED_STEP };
         !self.cells && longest > allowed * self.radius
     }
 }

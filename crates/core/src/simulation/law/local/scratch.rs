@@ -5,6 +5,7 @@ use glam::{DMat3, DVec3};
 use super::half_space::LocalBody;
 use super::inclination::OtherContacts;
 use super::response::LocalResponse;
+use super::secant::Secant;
 use crate::contact::footprint::FootprintScratch;
 use crate::contact::local::cells::{CellScratch, PressureState};
 use crate::contact::smooth::{FanWeights, FootPoint, SmoothSurface};
@@ -48,6 +49,10 @@ pub struct LocalScratch {
     pub(super) free_positions: [DVec3; MAX_CONTACTS],
     pub(super) positions: [DVec3; MAX_CONTACTS],
     pub(super) steps: [DVec3; MAX_CONTACTS],
+    /// Forces from which responses are evaluated, N, and the derivatives of these by the positions, N/m.
+    pub(super) guessed: [DVec3; MAX_CONTACTS],
+    pub(super) jacobians: [DMat3; MAX_CONTACTS],
+    pub(super) secant: Secant,
     /// The positions and responses with the least residual so far, for tools with pressure cells.
     best: Vec<(DVec3, LocalResponse)>,
     /// Whether there is one.
@@ -220,6 +225,9 @@ impl LocalScratch {
             free_positions: [DVec3::ZERO; MAX_CONTACTS],
             positions: [DVec3::ZERO; MAX_CONTACTS],
             steps: [DVec3::ZERO; MAX_CONTACTS],
+            guessed: [DVec3::ZERO; MAX_CONTACTS],
+            jacobians: [DMat3::ZERO; MAX_CONTACTS],
+            secant: Secant::default(),
             best: vec![(DVec3::ZERO, LocalResponse::default()); MAX_CONTACTS],
             has_best: false,
             force_change: 0.0,

@@ -22,7 +22,7 @@ const FIRST: usize = 3;
 /// A step that goes back by more than this part of the one before goes to and fro.
 const TURNED_BACK: f64 = 0.3;
 
-/// What the steps of one solution have shown.
+/// What the steps of one solution have shown. Of its memory only what belongs to contacts is set anew.
 #[derive(Default)]
 pub struct Secant {
     /// Whether steps have gone to and fro.
@@ -31,11 +31,18 @@ pub struct Secant {
     residuals: [DVec3; MAX_CONTACTS],
     steps: [DVec3; MAX_CONTACTS],
     share: f64,
-    /// `B`: a matrix is the identity by default.
+    /// `B`, once it is on.
     corrections: [DMat3; MAX_CONTACTS],
 }
 
 impl Secant {
+    /// Begins a solution for so many contacts.
+    pub fn begin(&mut self, contacts: usize) {
+        (self.is_on, self.share) = (false, 0.0);
+        self.residuals[..contacts].fill(DVec3::ZERO);
+        self.steps[..contacts].fill(DVec3::ZERO);
+    }
+
     /// What the matrix of a contact lacks, by its residual after the last step, m; `None` where no step has gone to and fro.
     pub fn correction(&mut self, contact: usize, residual: DVec3) -> Option<DMat3> {
         let (step, expected) = (self.steps[contact], self.residuals[contact] * (1.0 - self.share));
@@ -48,9 +55,15 @@ impl Secant {
 
     /// Compares whole steps with those taken before.
     pub fn compare(&mut self, step: usize, whole: &[DVec3]) {
+        if self.is_on {
+            return;
+        }
         let products = whole.iter().zip(&self.steps).map(|(now, before)| (now.dot(*before), before.length_squared()));
         let (along, squared) = products.fold((0.0, 0.0), |sum, (a, b)| (sum.0 + a, sum.1 + b));
-        self.is_on |= step >= FIRST && along < -TURNED_BACK * squared;
+        self.is_on = step >= FIRST && along < -TURNED_BACK * squared;
+        if self.is_on {
+            self.corrections[..whole.len()].fill(DMat3::IDENTITY);
+        }
     }
 
     /// Takes note of steps, a share of the whole ones.

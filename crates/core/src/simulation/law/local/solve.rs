@@ -169,6 +169,7 @@ fn solve_equations(
     let radius = if cells { tool.shape.thickness() } else { tool.radius };
     let mut trust = TrustRegion::default();
     local.has_best = false;
+    local.secant.begin(slots.len());
     let mut pace = Pace::new(cells, radius);
     for step in 0..SNAP_STEPS[0] {
         if cells && step == MOST_CELL_STEPS {
@@ -192,14 +193,15 @@ fn solve_equations(
                 continue;
             }
         }
-        let (longest, unstable) = newton_step(local, system, slots.len(), &mut pace);
-        pace.observe(step, &local.steps[..slots.len()], unstable, &local.responses[..slots.len()]);
+        let (longest, unstable) = newton_step(local, system, slots.len(), cells);
+        let (whole, responses) = (&local.steps[..slots.len()], &local.responses[..slots.len()]);
+        pace.observe(step, unstable, whole, responses, &mut local.secant);
         let longest = if cells { local.lengthen_by_power_law(slots.len()) } else { longest };
         let share = pace.share(step, longest, trust.longest_step);
         if share < 1.0 {
             local.steps[..slots.len()].iter_mut().for_each(|step| *step *= share);
         }
-        pace.secant.take(&local.steps[..slots.len()], share);
+        local.secant.take(&local.steps[..slots.len()], share);
         // The coupling of contacts is known after the first step.
         let is_coupled = step > 0 || slots.len() == 1;
         if is_coupled
@@ -312,9 +314,8 @@ fn evaluate_contacts(
     step: usize,
 ) -> bool {
     let resolution = resolution(model, state);
-    let mut guessed = [DVec3::ZERO; MAX_CONTACTS];
     for (a, &slot) in slots.iter().enumerate() {
-        guessed[a] = local.responses[a].force;
+        local.guessed[a] = local.responses[a].force;
         if contact_needs_cells(model, &state.contacts.slots[slot]) {
             local.footprint.others = other_planes(&state.contacts, slot);
         }
@@ -370,33 +371,34 @@ fn evaluate_contacts(
     }
     local.force_change = slots.iter().enumerate().fold(0.0, |most: f64, (a, _)| {
         let force = local.responses[a].force;
-        most.max((force - guessed[a]).length() / force.length().max(f64::MIN_POSITIVE))
+        most.max((force - local.guessed[a]).length() / force.length().max(f64::MIN_POSITIVE))
     });
     true
 }
 
 /// One step of Newton's method; returns the longest over the contacts, m, and whether one of them is unstable. Steps with pressure
 /// cells are bounded by their residuals instead.
-fn newton_step(local: &mut LocalScratch, system: &mut System, count: usize, pace: &mut Pace) -> (f64, bool) {
-    let (mut jacobians, mut unstable) = ([DMat3::ZERO; MAX_CONTACTS], false);
-    for (a, jacobian) in jacobians[..count].iter_mut().enumerate() {
-        *jacobian = local.responses[a].jacobian;
-        if !pace.cells {
+fn newton_step(local: &mut LocalScratch, system: &mut System, count: usize, cells: bool) -> (f64, bool) {
+    let mut unstable = false;
+    for a in 0..count {
+        let mut jacobian = local.responses[a].jacobian;
+        if !cells {
             let is_unstable;
-            (*jacobian, is_unstable) = stable_jacobian(*jacobian, &local.between[a][a]);
+            (jacobian, is_unstable) = stable_jacobian(jacobian, &local.between[a][a]);
             unstable |= is_unstable;
         }
+        local.jacobians[a] = jacobian;
     }
     for a in 0..count {
         let mut residual = local.positions[a] - local.free_positions[a];
         for b in 0..count {
             let between = local.between[a][b];
             residual += between * local.responses[b].force;
-            let mut block = between * jacobians[b];
+            let mut block = between * local.jacobians[b];
             if a == b {
                 let response = &local.responses[a];
                 residual += response.higher.displacement;
-                block += DMat3::IDENTITY + response.higher.compliance * jacobians[a];
+                block += DMat3::IDENTITY + response.higher.compliance * local.jacobians[a];
                 block += response.displacement_by_position();
             }
             for row in 0..3 {
@@ -406,7 +408,7 @@ fn newton_step(local: &mut LocalScratch, system: &mut System, count: usize, pace
             }
         }
         system.right[3 * a..3 * a + 3].copy_from_slice(&(-residual).to_array());
-        let Some(correction) = pace.secant.correction(a, residual) else { continue };
+        let Some(correction) = local.secant.correction(a, residual) else { continue };
         for row in 0..3 {
             for column in 0..3 {
                 system.matrix[3 * a + row][3 * a + column] += correction.col(column)[row];
