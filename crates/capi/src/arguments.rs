@@ -6,7 +6,8 @@ use std::path::Path;
 
 use crate::status::{Outcome, Refusal};
 
-fn null(name: &str) -> Refusal {
+/// Refusal of a null pointer.
+pub fn null(name: &str) -> Refusal {
     Refusal::argument(format!("{name} is a null pointer"))
 }
 

@@ -129,9 +129,8 @@ pub unsafe extern "C" fn palpate_scene_add_tool(
 ) -> Status {
     catching_panics(|| {
         // SAFETY: the caller's pointers.
-        let (scene, handle) = unsafe { (exclusive(scene, "scene")?, tool.as_mut()) };
-        // SAFETY: the caller's pointer.
-        let options = unsafe { versioned_struct::read_or_default(options) }?;
+        let (scene, options, handle) =
+            unsafe { (exclusive(scene, "scene")?, versioned_struct::read_or_default(options)?, tool.as_mut()) };
         // SAFETY: the caller's vertices and triangles.
         let id = scene.scene.add_tool(unsafe { options.tool() }?)?;
         handle.into_iter().for_each(|handle| *handle = id.0);

@@ -6,6 +6,7 @@
 
 use std::ptr::copy_nonoverlapping;
 
+use crate::arguments::{null, shared};
 use crate::status::{Outcome, Refusal};
 
 /// A struct that may grow.
@@ -47,11 +48,8 @@ fn check<T: VersionedStruct>(size: usize) -> Outcome<usize> {
 /// # Safety
 /// The pointer is null or points to a struct of the size that it states.
 pub unsafe fn read<T: VersionedStruct>(from: *const T) -> Outcome<T> {
-    if from.is_null() {
-        return Err(Refusal::argument(format!("{} is a null pointer", T::NAME)));
-    }
     // SAFETY: the first member of the caller's struct.
-    let size = check::<T>(unsafe { from.cast::<u32>().read() } as usize)?;
+    let size = check::<T>(*unsafe { shared(from.cast::<u32>(), T::NAME) }? as usize)?;
     let mut own = T::default();
     // SAFETY: `size` bytes are within both; every bit pattern is a valid `T`.
     unsafe { copy_nonoverlapping(from.cast::<u8>(), (&raw mut own).cast::<u8>(), size) };
@@ -75,13 +73,10 @@ pub unsafe fn read_or_default<T: VersionedStruct>(from: *const T) -> Outcome<T> 
 /// # Safety
 /// The pointer is null or points to a struct of the size that it states.
 pub unsafe fn write<T: VersionedStruct>(value: &T, to: *mut T) -> Outcome {
-    if to.is_null() {
-        return Err(Refusal::argument(format!("{} is a null pointer", T::NAME)));
-    }
     // SAFETY: the first member of the caller's struct.
-    let stated_size = unsafe { to.cast::<u32>().read() };
+    let stated_size = *unsafe { shared(to.cast::<u32>(), T::NAME) }? as usize;
     // SAFETY: it has the size that it states.
-    unsafe { write_as(value, to, stated_size as usize) }
+    unsafe { write_as(value, to, stated_size) }
 }
 
 /// The same into a struct of which the size is told beside it.
@@ -90,7 +85,7 @@ pub unsafe fn write<T: VersionedStruct>(value: &T, to: *mut T) -> Outcome {
 /// The pointer is null or points to `size` bytes.
 pub unsafe fn write_as<T: VersionedStruct>(value: &T, to: *mut T, size: usize) -> Outcome {
     if to.is_null() {
-        return Err(Refusal::argument(format!("{} is a null pointer", T::NAME)));
+        return Err(null(T::NAME));
     }
     let size = check::<T>(size)?;
     // SAFETY: `size` bytes are within both.

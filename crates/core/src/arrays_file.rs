@@ -3,10 +3,10 @@
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 
-use safetensors::tensor::{Dtype, SafeTensors, TensorView};
+use safetensors::tensor::{Dtype, SafeTensors};
 
-use crate::files::{read, unwritten, write_whole};
-use crate::header::{head_of, is_sealed, seal_file, unsealed};
+use crate::files::{read, write_whole};
+use crate::header::{Header, head_of, is_sealed};
 use crate::{Error, Result};
 
 /// A kind of files.
@@ -38,18 +38,13 @@ impl ArraysKind {
         let by_name = BTreeMap::from_iter(arrays.iter().map(|&(name, _, numbers)| (name, numbers)));
         let (version, sum) = (self.version.to_string(), sum(by_name.into_values()));
         let own = [("format", self.format), ("version", version.as_str()), ("checksum", sum.as_str())];
-        let mut metadata = HashMap::from([unsealed()]);
-        metadata.extend(own.iter().chain(texts).map(|&(name, text)| (name.to_string(), text.to_string())));
-        let failed = |e| unwritten(path, e);
-        let mut views = Vec::new();
+        let mut header = Header::new(own.iter().chain(texts).map(|&(name, text)| (name, text.to_string())));
         for (name, shape, numbers) in arrays {
-            let bytes = bytemuck::cast_slice::<f64, u8>(numbers);
-            views.push((name, TensorView::new(Dtype::F64, shape.clone(), bytes).map_err(failed)?));
+            header.tensor(name, Dtype::F64, shape, size_of_val(*numbers));
         }
-        write_whole(path, |partial| {
-            safetensors::serialize_to_file(views, Some(metadata), partial).map_err(failed)?;
-            seal_file(partial).map_err(|source| Error::Io { path: path.to_owned(), source })
-        })
+        let header = header.bytes();
+        let numbers = arrays.iter().map(|(_, _, numbers)| bytemuck::cast_slice(numbers));
+        write_whole(path, std::iter::once(&header[..]).chain(numbers))
     }
 
     /// Reads and verifies a file.
@@ -59,30 +54,30 @@ impl ArraysKind {
     pub fn read(&self, path: &Path) -> Result<ArraysFile> {
         let Self { format, name, version } = self;
         let bytes = read(path).map_err(|source| Error::Io { path: path.to_owned(), source })?;
-        let broken = |e| refused(path, format!("is not a {name}, or is damaged or cut short ({e})"));
+        let broken = |e| Error::store(path, format!("is not a {name}, or is damaged or cut short ({e})"));
         let (_, header) = SafeTensors::read_metadata(&bytes).map_err(broken)?;
         let texts = header.metadata().clone().unwrap_or_default();
         let text = |name: &str| texts.get(name).map_or("", String::as_str);
         if text("format") != *format {
-            return Err(refused(path, format!("is not a {name}")));
+            return Err(Error::store(path, format!("is not a {name}")));
         }
         if text("version") != version.to_string() {
             let found = text("version");
-            return Err(refused(path, format!("has format version {found}, this program reads {version}")));
+            return Err(Error::store(path, format!("has format version {found}, this program reads {version}")));
         }
         if !head_of(&bytes).is_some_and(is_sealed) {
-            return Err(refused(path, "is damaged: the checksum of its header differs; compute it again"));
+            return Err(Error::store(path, "is damaged: the checksum of its header differs; compute it again"));
         }
         let mut arrays = BTreeMap::new();
         for (name, tensor) in SafeTensors::deserialize(&bytes).map_err(broken)?.tensors() {
             if tensor.dtype() != Dtype::F64 {
-                return Err(refused(path, format!("is damaged: the type of '{name}' is wrong")));
+                return Err(Error::store(path, format!("is damaged: the type of '{name}' is wrong")));
             }
             let numbers: Vec<f64> = tensor.data().chunks_exact(8).map(bytemuck::pod_read_unaligned).collect();
             arrays.insert(name, (tensor.shape().to_vec(), numbers));
         }
         if sum(arrays.values().map(|(_, numbers)| &numbers[..])) != text("checksum") {
-            return Err(refused(path, "is damaged: its checksum differs; compute it again"));
+            return Err(Error::store(path, "is damaged: its checksum differs; compute it again"));
         }
         Ok(ArraysFile { path: path.to_owned(), texts, arrays })
     }
@@ -99,7 +94,7 @@ impl ArraysFile {
     /// # Errors
     /// No such array.
     pub fn take(&mut self, name: &str) -> Result<(Vec<usize>, Vec<f64>)> {
-        let missing = || refused(&self.path, format!("is damaged: '{name}' is missing"));
+        let missing = || Error::store(&self.path, format!("is damaged: '{name}' is missing"));
         self.arrays.remove(name).ok_or_else(missing)
     }
 }
@@ -111,8 +106,4 @@ fn sum<'a>(arrays: impl Iterator<Item = &'a [f64]>) -> String {
         hash.update(bytemuck::cast_slice(numbers));
     }
     hash.finalize().to_hex().to_string()
-}
-
-fn refused(path: &Path, reason: impl Into<String>) -> Error {
-    Error::Store { path: path.to_owned(), reason: reason.into() }
 }

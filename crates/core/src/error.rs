@@ -38,5 +38,12 @@ pub enum Error {
     Interrupted,
 }
 
+impl Error {
+    /// What is wrong with a store, and what to do.
+    pub fn store(path: impl Into<PathBuf>, reason: impl Into<String>) -> Self {
+        Error::Store { path: path.into(), reason: reason.into() }
+    }
+}
+
 /// Result with the crate's error.
 pub type Result<T, E = Error> = std::result::Result<T, E>;

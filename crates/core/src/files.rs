@@ -3,11 +3,9 @@
 
 use std::collections::HashMap;
 use std::fs::{self, File};
-use std::io;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-
-use safetensors::SafeTensorError;
 
 use crate::positioned::Source;
 use crate::{Error, Result};
@@ -52,29 +50,21 @@ pub fn read(path: &Path) -> io::Result<Vec<u8>> {
     }
 }
 
-/// Gives a path beside `path` to `write`, and renames what it wrote into place.
+/// Writes bytes, piece after piece, beside `path`, and renames the file into place.
 ///
 /// # Errors
-/// What `write` returns, or the operating system's, with nothing left behind.
-pub(crate) fn write_whole(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
-    let io = |source| Error::Io { path: path.to_owned(), source };
+/// The operating system's, with nothing left behind.
+pub(crate) fn write_whole<'a>(path: &Path, pieces: impl Iterator<Item = &'a [u8]>) -> Result<()> {
     let partial = partial_path(path);
-    let written = write(&partial).and_then(|()| {
-        File::open(&partial).and_then(|f| f.sync_all()).map_err(io)?;
-        fs::rename(&partial, path).map_err(io)
+    let written = File::create(&partial).and_then(|mut file| {
+        pieces.into_iter().try_for_each(|piece| file.write_all(piece))?;
+        file.sync_all()?;
+        fs::rename(&partial, path)
     });
-    if written.is_err() {
+    written.map_err(|source| {
         let _ = fs::remove_file(&partial);
-    }
-    written
-}
-
-/// What safetensors says of a file that cannot be written.
-pub(crate) fn unwritten(path: &Path, error: SafeTensorError) -> Error {
-    match error {
-        SafeTensorError::IoError(source) => Error::Io { path: path.to_owned(), source },
-        other => Error::Store { path: path.to_owned(), reason: format!("cannot be written: {other}") },
-    }
+        Error::Io { path: path.to_owned(), source }
+    })
 }
 
 fn partial_path(path: &Path) -> PathBuf {

@@ -4,11 +4,7 @@
 //! blocks) is in the header, and a changed digit there would load. The sum is that of all bytes of the head, with zeros in
 //! place of the sum.
 
-use std::fs::OpenOptions;
-use std::io;
-use std::path::Path;
-
-use crate::positioned::Positioned;
+use safetensors::tensor::Dtype;
 
 /// Name of the sum among the header's texts.
 const NAME: &str = "header_checksum";
@@ -17,14 +13,50 @@ const DIGITS: usize = 64;
 /// Longest header that is read, bytes; safetensors allows no longer one.
 pub(crate) const HEADER_BYTES: u64 = 100_000_000;
 
-/// Name and value among the header's texts until [`seal`] writes the sum.
-pub(crate) fn unsealed() -> (String, String) {
-    (NAME.to_string(), "0".repeat(DIGITS))
+/// The header of a safetensors file: its length in eight bytes, then JSON, padded so that what follows is aligned.
+pub(crate) struct Header {
+    fields: serde_json::Map<String, serde_json::Value>,
+    end: usize,
+}
+
+impl Header {
+    /// With these texts.
+    pub fn new<'a>(texts: impl IntoIterator<Item = (&'a str, String)>) -> Self {
+        let mut header = Self { fields: serde_json::Map::new(), end: 0 };
+        texts.into_iter().for_each(|(name, text)| header.text(name, &text));
+        // In place of the sum.
+        header.text(NAME, &"0".repeat(DIGITS));
+        header
+    }
+
+    /// Adds a text.
+    pub fn text(&mut self, name: &str, text: &str) {
+        let texts = self.fields.entry("__metadata__").or_insert_with(|| serde_json::json!({}));
+        texts[name] = text.into();
+    }
+
+    /// Adds a tensor behind the others.
+    pub fn tensor(&mut self, name: &str, dtype: Dtype, shape: &[usize], bytes: usize) {
+        let offsets = [self.end, self.end + bytes];
+        let tensor = serde_json::json!({"dtype": dtype.to_string(), "shape": shape, "data_offsets": offsets});
+        self.fields.insert(name.to_string(), tensor);
+        self.end += bytes;
+    }
+
+    /// The header, sealed.
+    pub fn bytes(self) -> Vec<u8> {
+        let mut json = serde_json::Value::Object(self.fields).to_string().into_bytes();
+        json.resize(json.len().next_multiple_of(8), b' ');
+        let mut head = [&(json.len() as u64).to_le_bytes()[..], &json].concat();
+        let sealed = seal(&mut head);
+        debug_assert!(sealed, "the header has a place for its sum");
+        head
+    }
 }
 
 /// Writes the sum into the head of a file: the length of the header in eight bytes, and the header. `false` where it has no
 /// place for it.
-pub(crate) fn seal(head: &mut [u8]) -> bool {
+fn seal(head: &mut [u8]) -> bool {
     let Some((at, sum)) = sum_of(head) else { return false };
     head[at..at + DIGITS].copy_from_slice(sum.as_bytes());
     true
@@ -33,26 +65,6 @@ pub(crate) fn seal(head: &mut [u8]) -> bool {
 /// Whether the head of a file is as it was sealed.
 pub(crate) fn is_sealed(head: &[u8]) -> bool {
     sum_of(head).is_some_and(|(at, sum)| head[at..at + DIGITS] == *sum.as_bytes())
-}
-
-/// Writes the sum into the head of a file that has just been written.
-///
-/// # Errors
-/// The operating system's, or a file without a header.
-pub(crate) fn seal_file(path: &Path) -> io::Result<()> {
-    let file = OpenOptions::new().read(true).write(true).open(path)?;
-    let mut count = [0; 8];
-    file.read_exact_at(&mut count, 0)?;
-    let length = u64::from_le_bytes(count);
-    if length > HEADER_BYTES {
-        return Err(io::ErrorKind::InvalidData.into());
-    }
-    let mut head = vec![0; 8 + length as usize];
-    file.read_exact_at(&mut head, 0)?;
-    if !seal(&mut head) {
-        return Err(io::ErrorKind::InvalidData.into());
-    }
-    file.write_all_at(&head, 0)
 }
 
 /// The head of a whole file in memory; `None` where it has none.

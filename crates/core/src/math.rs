@@ -5,3 +5,9 @@
 //! browser.
 
 pub(crate) use libm::{acos, asin, atan2, atanh, cbrt, cos, exp, expm1, hypot, log, log2, pow, sin, sincos, tan, tanh};
+
+/// Sum of eight numbers in the order of a processor's vector registers.
+#[inline(always)]
+pub(crate) fn sum_lanes([a, b, c, d, e, f, g, h]: [f64; 8]) -> f64 {
+    ((a + e) + (c + g)) + ((b + f) + (d + h))
+}

@@ -90,9 +90,9 @@ fn a_patch_moves_by_its_free_motion_and_its_compliance() {
         let force = DVec3::new(0.2, -0.4, 0.7);
         model.predict(&mut state);
         let free = here.read(&model, &state.q);
-        scratch.load.fill(Lanes::default());
-        there.add_force(&model, force, &mut scratch.load);
-        model.correct(&mut state, &scratch.load);
+        scratch.fill(Lanes::default());
+        there.add_force(&model, force, &mut scratch);
+        model.correct(&mut state, &scratch);
         let moved = here.read(&model, &state.q) - free;
         let expected = here.step_compliance(&model, there) * force;
         assert!((moved - expected).length() < 1e-12 * expected.length().max(1e-6), "{moved} {expected}");
@@ -128,11 +128,11 @@ fn is_the_same_motion(model: &ModalModel) {
                 patches.iter().zip(&forces).map(|(patch, &force)| LoadedPatch::new(patch, force)).collect();
             let advanced = model.advance(&mut predicted, &mut loaded);
             model.predict(&mut state);
-            scratch.load.fill(Lanes::default());
+            scratch.fill(Lanes::default());
             for (patch, &force) in patches.iter().zip(&forces) {
-                patch.add_force(model, force, &mut scratch.load);
+                patch.add_force(model, force, &mut scratch);
             }
-            model.correct(&mut state, &scratch.load);
+            model.correct(&mut state, &scratch);
             account.book(model, &state);
             dissipated += advanced.dissipated;
             assert_eq!(bits(&predicted.q), bits(&state.q));
@@ -162,11 +162,11 @@ fn static_compliance_is_where_a_held_force_ends() {
     let force = DVec3::new(0.0, 0.1, 0.4);
     for _ in 0..60_000 {
         model.predict(&mut state);
-        scratch.load.fill(Lanes::default());
-        patch.add_force(&model, force, &mut scratch.load);
+        scratch.fill(Lanes::default());
+        patch.add_force(&model, force, &mut scratch);
         // The first mode is rigid: it would fly away.
-        scratch.load[0].0[0] = 0.0;
-        model.correct(&mut state, &scratch.load);
+        scratch[0].0[0] = 0.0;
+        model.correct(&mut state, &scratch);
     }
     let expected = patch.static_compliance(&model, &patch) * force;
     let got = patch.read(&model, &state.q);

@@ -35,9 +35,6 @@ pub(crate) fn claimed(claim: Option<&StoreClaim>, path: PathBuf) -> Answer<Arc<C
     if let Some(claim) = claim {
         return Ok(Arc::clone(&claim.claim));
     }
-    let busy = || Error::Store {
-        path: path.clone(),
-        reason: "is being computed by another process: wait for it to end".into(),
-    };
+    let busy = || Error::store(&path, "is being computed by another process: wait for it to end");
     Ok(Arc::new(Claim::take(&path)?.ok_or_else(busy)?))
 }

@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
-use faer::{MatMut, Par};
+use faer::Par;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use palpate_core::dynamics::{
-    Basis, Direct, DirectScratch, DirectState, Energy, EnergyAccount, Integration, Lanes, ModalModel, ModalScratch,
-    ModalState, Newmark, Rayleigh, Solver, basis_key as core_basis_key, partition,
+    Basis, Direct, DirectScratch, DirectState, Energy, EnergyAccount, Integration, Lanes, ModalModel, ModalState,
+    Newmark, Rayleigh, Solver, basis_key as core_basis_key, partition,
 };
 use palpate_core::fem::SymmetricCsc;
 use palpate_core::solver::Factor;
@@ -155,7 +155,7 @@ impl SparseFactor {
         }
         py.detach(|| {
             let mut memory = self.factor.solve_scratch(1);
-            self.factor.solve_in_place(MatMut::from_column_major_slice_mut(&mut x, rows, 1), &mut memory);
+            self.factor.solve_in_place(&mut x, &mut memory);
         });
         Ok(x.into_pyarray(py))
     }
@@ -166,7 +166,7 @@ impl SparseFactor {
 pub struct ModalMotion {
     model: ModalModel,
     state: ModalState,
-    scratch: ModalScratch,
+    scratch: Vec<Lanes>,
     account: EnergyAccount,
 }
 

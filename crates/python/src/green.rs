@@ -10,8 +10,8 @@ use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use palpate_core::capacitance::{self, Change};
 use palpate_core::fem::Supports;
 use palpate_core::green::{
-    GreensFunction, Growth, Phase, Plan, Precision, PreviousWork, Problem, Progress, RequestedPrecision, Target, plan,
-    precompute, precompute_to,
+    Extension, GreensFunction, Growth, Phase, Plan, Precision, PreviousWork, Problem, Progress, RequestedPrecision,
+    Target, plan, precompute, precompute_to,
 };
 use palpate_core::mesh::TetMesh;
 use palpate_core::{Error, Result, contact};

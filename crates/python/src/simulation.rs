@@ -8,7 +8,7 @@ use glam::DVec3;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use palpate_core::simulation::{MAX_BODIES, Strike};
 use palpate_devices::simulated::{Handle, Target};
-use palpate_recording::RecordingInMemory;
+use palpate_recording::{Recorder, RecordingInMemory};
 use palpate_scene::{BodyId, PreparedScene, Scene, unit_quaternion};
 use palpate_servo::{SafetyLimits, Scheduling, Script, Servo, Settings, TickRecord};
 use pyo3::prelude::*;
@@ -18,7 +18,7 @@ use pyo3::types::{PyBytes, PyDict};
 use crate::connection::{Connected, common_scheduler};
 use crate::errors::Answer;
 use crate::frame::{frame, push_row};
-use crate::recording::{Recording, RecordingStatus, header};
+use crate::recording::{self, RecordingStatus, header};
 use crate::scene::{
     BodyArguments, ContactRecord, ToolArguments, contact_records, energy_array, poses, scene_body, scene_tool,
     settings_dict,
@@ -50,7 +50,7 @@ pub(crate) struct RunningParts {
     pub servo: Option<Servo>,
     /// Blocks of series that a loop may still have: body, radius (m), which blocks.
     pub earlier_series: Vec<(BodyId, f64, Vec<bool>)>,
-    recording: Option<Recording>,
+    recording: Option<Recorder>,
 }
 
 #[pymethods]
@@ -121,7 +121,7 @@ impl SimulationCore {
         drop(parts);
         if let Some(mut servo) = servo {
             py.detach(|| {
-                recording.map(|recording| recording.end(servo.end_recording()));
+                recording.map(|recorder| recording::end(recorder, servo.end_recording()));
                 servo.stop();
             });
         }
@@ -244,7 +244,7 @@ impl SimulationCore {
         let mut parts = self.parts(py);
         let header = header(about, &parts.prepared.model, parts.prepared.scheduling.rate, true);
         let RunningParts { servo: Some(servo), recording, .. } = &mut *parts else { return Ok(()) };
-        *recording = Some(py.detach(|| Recording::begin(&path, header, servo))?);
+        *recording = Some(py.detach(|| recording::begin(&path, header, servo))?);
         Ok(())
     }
 
@@ -252,17 +252,17 @@ impl SimulationCore {
     fn recording(&self, py: Python<'_>) -> Option<RecordingStatus> {
         let mut parts = self.parts(py);
         let progress = parts.servo.as_mut()?.latest().status.recording;
-        parts.recording.as_ref().map(|recording| recording.status(progress.dropped))
+        parts.recording.as_ref().map(|recorder| recording::status(recorder, progress.dropped))
     }
 
     /// Ends the recording: the same of it as a whole.
     fn end_recording(&self, py: Python<'_>) -> Option<RecordingStatus> {
         let mut parts = self.parts(py);
-        let recording = parts.recording.take()?;
+        let recorder = parts.recording.take()?;
         let servo = parts.servo.as_mut()?;
         let ticks = py.detach(|| servo.end_recording());
         drop(parts);
-        Some(py.detach(|| recording.end(ticks)))
+        Some(py.detach(|| recording::end(recorder, ticks)))
     }
 
     /// Moves the tools through positions (ticks, tools, 3), NaN where one is out of the scene, orientations (ticks, tools,

@@ -38,9 +38,9 @@ pub fn moduli_of_store(green: &GreensFunction) -> Result<Option<Moduli>> {
     let count = green.surface_count();
     let [youngs, poissons] = known.map(|values| if values.len() == 1 { vec![values[0]; count] } else { values });
     if youngs.len() != count || poissons.len() != count {
-        let path = green.path.as_deref().unwrap_or(Path::new("store")).to_owned();
+        let path = green.path.as_deref().unwrap_or(Path::new("store"));
         let reason = format!("is damaged (elastic constants at {} of {count} nodes); compute it again", youngs.len());
-        return Err(Error::Store { path, reason });
+        return Err(Error::store(path, reason));
     }
     Ok(Some(Moduli::linear(youngs, poissons, homogeneous)))
 }

@@ -278,7 +278,7 @@ impl ForceLoop {
     fn begin_record(&mut self, now_ns: u64, period: f64) {
         let recorder = &mut self.ends.recorder;
         if recorder.exchange(&mut self.state, &mut self.stages) {
-            self.ends.strain.begin(recorder.number());
+            self.ends.strain.begin(recorder.number);
         }
         recorder.begin_tick((now_ns, period), self.fault, &self.stages);
     }
@@ -349,7 +349,7 @@ impl ForceLoop {
 
     fn request_strain(&mut self, input: &Input) {
         let (ends, limits) = (&mut self.ends, &input.controls.strain_limit);
-        let unsent = ends.strain.ask(&self.state, limits, ends.recorder.number(), self.skipped);
+        let unsent = ends.strain.ask(&self.state, limits, ends.recorder.number, self.skipped);
         ends.recorder.input().strain.unsent = unsent;
     }
 
@@ -362,7 +362,7 @@ impl ForceLoop {
         status.time = 1e-9 * now_ns.saturating_sub(start_ns) as f64;
         (status.settings, status.limited) = (self.settings, output.limited);
         status.fault = fault(self.fault, &self.stages);
-        status.recording = self.ends.recorder.progress();
+        status.recording = self.ends.recorder.progress;
         for (tool, blocks) in self.model.tools.iter().zip(&mut status.series_blocks) {
             for (body, blocks) in self.state.bodies.iter().zip(blocks) {
                 *blocks = body.series(tool.radius).map_or(0, |series| series.known_blocks);

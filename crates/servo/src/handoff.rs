@@ -150,7 +150,7 @@ impl LoopHandle {
 
     /// Whether a recording has begun, and not been ended.
     pub(crate) fn is_recorded(&self) -> bool {
-        self.recorder.is_recording()
+        self.recorder.is_recording
     }
 
     /// Switches to the loop that has replaced this one's. Log and commands continue in the same rings.

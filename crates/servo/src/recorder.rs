@@ -38,10 +38,11 @@ pub(crate) struct RecorderEnd {
     records: Option<Producer<TickRecord>>,
     /// The record of the tick under way.
     record: TickRecord,
-    /// Number of the tick under way, and of the first one recorded.
-    number: u64,
+    /// Number of the tick under way, since the loop was made, and of the first one recorded.
+    pub number: u64,
     first: u64,
-    progress: RecordingProgress,
+    /// How far the recording has come.
+    pub progress: RecordingProgress,
 }
 
 /// How far a recording has come.
@@ -60,7 +61,8 @@ pub(crate) struct RecorderHandle {
     exchange: ExchangeHandle<Request>,
     /// As at the start of a loop.
     stages: Vec<SafetyStage>,
-    is_recording: bool,
+    /// Whether a recording has begun, and not been ended.
+    pub is_recording: bool,
 }
 
 /// Both ends.
@@ -88,11 +90,6 @@ impl RecorderHandle {
         self.is_recording = self.exchange.offer(Request::Begin(Box::new(beginning)));
         let busy = || Error::Invalid("the loop has not yet ended the last recording: try again".into());
         self.is_recording.then_some(consumer).ok_or_else(busy)
-    }
-
-    /// Whether a recording has begun, and not been ended.
-    pub fn is_recording(&self) -> bool {
-        self.is_recording
     }
 
     /// Has the loop stop recording.
@@ -132,16 +129,6 @@ impl RecorderEnd {
             }
         }
         began
-    }
-
-    /// How far the recording has come.
-    pub fn progress(&self) -> RecordingProgress {
-        self.progress
-    }
-
-    /// The number of the tick under way, since the loop was made.
-    pub fn number(&self) -> u64 {
-        self.number
     }
 
     /// A tick begins that is due at a time, ns, after a period, s.

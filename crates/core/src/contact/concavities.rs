@@ -7,6 +7,7 @@
 
 use glam::DVec3;
 
+use super::map_with;
 use super::smooth::SmoothSurface;
 use crate::memory::Ranges;
 
@@ -39,14 +40,8 @@ impl Concavities {
     /// For a tool that fits into a ball of `radius`, m.
     pub fn new(smooth: &SmoothSurface, radius: f64) -> Self {
         let by_x = sorted(smooth);
-        let of_fan = |fan: usize| starts(smooth, &by_x, fan, radius);
-        #[cfg(feature = "offline")]
-        let starts_of_fans: Vec<Vec<u32>> = {
-            use rayon::prelude::*;
-            (0..smooth.fans().len()).into_par_iter().map(of_fan).collect()
-        };
-        #[cfg(not(feature = "offline"))]
-        let starts_of_fans: Vec<Vec<u32>> = (0..smooth.fans().len()).map(of_fan).collect();
+        let of_fan = |(): &mut (), fan: usize| starts(smooth, &by_x, fan, radius);
+        let starts_of_fans = map_with(smooth.fans().len(), || (), of_fan);
         if starts_of_fans.iter().all(Vec::is_empty) {
             return Self::default();
         }

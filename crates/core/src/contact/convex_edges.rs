@@ -35,7 +35,6 @@ use super::corner_share::ConvexCorner;
 use super::footprint::smooth_step;
 use super::modulus_share::Share;
 use super::smooth::{ConvexCrease, FootPoint, SmoothSurface};
-use super::wedge::LISTED_INSIDE;
 use super::{SurfaceQuery, TriangleLists};
 use crate::math::{acos, hypot};
 use crate::memory::Ranges;
@@ -52,8 +51,9 @@ const MOST_BY_TURN: f64 = 1.0;
 const BLADE: f64 = 1.5;
 /// `w` over the sphere's radius.
 const SLOWED: f64 = 0.3;
-/// Edges up to this distance from a triangle, over the radius, are listed for it.
-const LISTED: f64 = 1.0;
+/// Edges up to this distance from a triangle, over the radius, are listed for it; and up to the second one for centres inside a body: the
+/// band between two faces reaches so far three radii deep.
+const LISTED: [f64; 2] = [1.0, 5.0];
 /// Cosine of the angle between two edges that meet, from which they are pieces of one.
 const SAME_CHAIN: f64 = 0.7;
 /// Cosines between the normal of a foot and that of a face of an edge from which the edge counts, and counts fully.
@@ -247,9 +247,8 @@ impl ConvexEdges {
         if edges.is_empty() {
             return None;
         }
-        let listed =
-            |reach: f64| TriangleLists::new(surface, query, edges.iter().map(|edge| edge.box_around(reach * radius)));
-        let (near, around_inside) = (listed(LISTED), listed(LISTED_INSIDE));
+        let boxes = |reach: f64| edges.iter().map(move |edge| edge.box_around(reach * radius));
+        let [near, around_inside] = LISTED.map(|reach| TriangleLists::new(surface, query, boxes(reach)));
         let ending = |at: DVec3| {
             let ends = move |edge: &&Edge| (0..2).any(|k| edge.is_last[k] && edge.ends[k] == at);
             edges.iter().filter(ends).map(|edge| edge.normals)

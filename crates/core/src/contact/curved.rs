@@ -8,6 +8,7 @@ use pulp::{Arch, NullaryFnOnce};
 
 use super::face::FaceGeometry;
 use super::moments::{CELL_SIZE, Coordinates, MAX_DEPTH, Moments, cell_reach, halfway};
+use crate::math::sum_lanes;
 
 /// Points summed side by side. The order of the sums is fixed, whatever the processor's vectors.
 const LANES: usize = 8;
@@ -230,7 +231,7 @@ impl NullaryFnOnce for Sum<'_> {
         let mut sums = [[0.0; LANES]; 6];
         for points in self.points {
             let inside = mask.at(&places(coefficients, points));
-            if total(inside) > 0.0 {
+            if sum_lanes(inside) > 0.0 {
                 add(&mut sums, points, &inside, &areas(coefficients, points));
             }
         }
@@ -341,12 +342,7 @@ fn add(sums: &mut [Lane; 6], points: &Points, inside: &Lane, area: &Lane) {
 fn totals(sums: &[Lane; 6]) -> [f64; 6] {
     let mut totals = [0.0; 6];
     for k in 0..6 {
-        totals[k] = total(sums[k]);
+        totals[k] = sum_lanes(sums[k]);
     }
     totals
-}
-
-#[inline(always)]
-fn total([a, b, c, d, e, f, g, h]: Lane) -> f64 {
-    ((a + e) + (c + g)) + ((b + f) + (d + h))
 }

@@ -15,7 +15,6 @@ mod modulus_share;
 mod moments;
 mod patch;
 mod quadrature;
-mod refusal;
 pub mod regular;
 mod regular_store;
 pub mod shape;
@@ -36,9 +35,8 @@ pub use local::SeriesFields;
 pub use modulus_share::Share;
 #[cfg(feature = "offline")]
 pub use patch::wide_patch_weights;
-pub use patch::{MAX_PATCH_NODES, Patch, PatchScratch, patch_weights};
+pub use patch::{MAX_PATCH_NODES, Patch, PatchScratch, Refusal, patch_weights};
 pub use quadrature::PatchGeometry;
-pub use refusal::Refusal;
 pub use regular::{CompliantBody, FanFields, Moduli, RegularCompliance, centre_of, known_fans};
 pub use regular_store::remove_compliance_files;
 pub use tessellation::Tessellation;
@@ -46,3 +44,21 @@ pub use thin::{is_thin_at, thickness_for};
 pub use touch_patch::TouchPatch;
 pub(crate) use triangle_lists::TriangleLists;
 pub use wedge::{BetweenFaces, Faces};
+
+/// Maps the numbers below `count`, in their order, with some memory for each thread; without the offline part there is one thread.
+fn map_with<M, T: Send>(
+    count: usize,
+    memory: impl Fn() -> M + Sync + Send,
+    of: impl Fn(&mut M, usize) -> T + Sync + Send,
+) -> Vec<T> {
+    #[cfg(feature = "offline")]
+    {
+        use rayon::prelude::*;
+        (0..count).into_par_iter().map_init(memory, of).collect()
+    }
+    #[cfg(not(feature = "offline"))]
+    {
+        let mut memory = memory();
+        (0..count).map(|k| of(&mut memory, k)).collect()
+    }
+}

@@ -12,8 +12,8 @@ use std::sync::atomic::Ordering;
 use glam::DVec3;
 
 use super::closest::SurfacePoint;
+use super::map_with;
 use super::quadrature::PatchGeometry;
-use super::refusal::Refusal;
 use crate::element::{Face, Tri3, Tri6};
 use crate::green::GreensFunction;
 use crate::mesh::{Faces, Surface};
@@ -23,6 +23,25 @@ use crate::{Error, Result};
 pub const MAX_PATCH_NODES: usize = 256;
 /// Least cosine between the normals of a patch's middle and of a triangle in it. Zero would leave right angles to rounding.
 const FACING: f64 = 1e-6;
+
+/// Reason why no contact begins at a point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Refusal {
+    /// A node under the contact lies outside the touch region; its rank among the surface nodes.
+    NotTouchable(u32),
+    /// The contact covers more than [`MAX_PATCH_NODES`] nodes.
+    TooManyNodes,
+}
+
+impl Refusal {
+    /// Message of one line.
+    pub fn message(self) -> &'static str {
+        match self {
+            Refusal::NotTouchable(_) => "the contact reaches outside the touch region",
+            Refusal::TooManyNodes => "the contact covers too many nodes: choose a smaller contact radius",
+        }
+    }
+}
 
 /// The nodes under a contact and their weights.
 #[derive(Clone, Debug)]
@@ -228,28 +247,18 @@ impl PatchGeometry {
         }
         let surface = &green.surface;
         let memory = || (PatchScratch::new(surface), Patch::default());
-        let fits = |(scratch, patch): &mut (PatchScratch, Patch), triangle: u32| {
+        let fits = |(scratch, patch): &mut (PatchScratch, Patch), triangle: usize| {
+            if !surface.triangles[triangle].iter().any(|&node| green.touchable(node as usize).is_some()) {
+                return true;
+            }
+            let triangle = triangle as u32;
             let corners = surface.corners(triangle);
             let position: DVec3 = (corners[0] + corners[1] + corners[2]) / 3.0;
             let normal = surface.normals[triangle as usize];
             let centre = SurfacePoint { position, triangle, barycentric: [1.0 / 3.0; 3], normal, signed_distance: 0.0 };
             patch_weights(surface, self, &centre, radius, scratch, patch).is_ok()
         };
-        let may_be_touched = |triangle: &u32| {
-            surface.triangles[*triangle as usize].iter().any(|&node| green.touchable(node as usize).is_some())
-        };
-        let count = surface.triangles.len() as u32;
-        #[cfg(feature = "offline")]
-        let all_fit = {
-            use rayon::prelude::*;
-            (0..count).into_par_iter().filter(may_be_touched).map_init(memory, fits).all(|fits| fits)
-        };
-        #[cfg(not(feature = "offline"))]
-        let all_fit = {
-            let mut memory = memory();
-            (0..count).filter(may_be_touched).all(|triangle| fits(&mut memory, triangle))
-        };
-        if !all_fit {
+        if map_with(surface.triangles.len(), memory, fits).contains(&false) {
             return Err(Error::Invalid(format!(
                 "a contact radius of {radius} m covers too many surface nodes, the limit is {MAX_PATCH_NODES}: \
                  choose a smaller radius or a coarser mesh"

@@ -42,10 +42,9 @@ use glam::DMat3;
 use super::local::StrainTerms;
 use super::smooth::{Blended, Fan, FanWeights, SmoothSurface};
 use super::{
-    PatchGeometry, PatchScratch, Refusal, SurfacePoint, TouchPatch, patch_weights, raise_eigenvalues,
+    Patch, PatchGeometry, PatchScratch, Refusal, SurfacePoint, TouchPatch, map_with, patch_weights, raise_eigenvalues,
     smallest_eigenvalue,
 };
-use crate::contact::Patch;
 use crate::green::GreensFunction;
 use crate::memory::Ranges;
 use crate::mesh::{Faces, Surface};
@@ -194,21 +193,11 @@ impl RegularCompliance {
             if body.smooth.touchable[fan] {
                 fan_compliance(body, fan, radii, max_stiffness, scratch, patch)
             } else {
-                FanCompliance::default()
+                FanCompliance { regular: DMat3::ZERO, width: 0.0, widening: 0.0 }
             }
         };
         let memory = || (PatchScratch::new(&body.green.surface), Patch::default());
-        #[cfg(feature = "offline")]
-        let fan_compliances: Vec<_> = {
-            use rayon::prelude::*;
-            (0..count).into_par_iter().map_init(memory, block).collect()
-        };
-        #[cfg(not(feature = "offline"))]
-        let fan_compliances: Vec<_> = {
-            let mut memory = memory();
-            (0..count).map(|fan| block(&mut memory, fan)).collect()
-        };
-        let fields = fan_compliances.into_iter().zip(body.smooth.fans()).map(|(at, fan)| {
+        let fields = map_with(count, memory, block).into_iter().zip(body.smooth.fans()).map(|(at, fan)| {
             let FanCompliance { regular: c, width, widening } = at;
             let (inverse, poisson) =
                 (1.0 / body.moduli.plane_strain(fan.node), body.moduli.poissons[fan.node as usize]);
@@ -233,12 +222,6 @@ struct FanCompliance {
     regular: DMat3,
     width: f64,
     widening: f64,
-}
-
-impl Default for FanCompliance {
-    fn default() -> Self {
-        Self { regular: DMat3::ZERO, width: 0.0, widening: 0.0 }
-    }
 }
 
 /// Measures a patch of some radius around one fan.

@@ -6,8 +6,8 @@
 
 use glam::DVec3;
 
-use super::SurfaceQuery;
 use super::smooth::{DrawnSurface, FootPoint, Neighbourhood, SmoothSurface};
+use super::{SurfaceQuery, map_with};
 use crate::memory::Ranges;
 use crate::mesh::Surface;
 
@@ -75,16 +75,7 @@ impl Tessellation {
         let on_crease = smooth.crease_nodes(surface);
         let place = |near: &mut Neighbourhood, t: usize| placed(&lattice, drawn, smooth, &on_crease, (near, t as u32));
         let memory = || Neighbourhood::new(std::iter::once(smooth));
-        #[cfg(feature = "offline")]
-        let vertices: Vec<Vec<(DVec3, DVec3)>> = {
-            use rayon::prelude::*;
-            (0..surface.triangles.len()).into_par_iter().map_init(memory, place).collect()
-        };
-        #[cfg(not(feature = "offline"))]
-        let vertices: Vec<Vec<(DVec3, DVec3)>> = {
-            let mut near = memory();
-            (0..surface.triangles.len()).map(|t| place(&mut near, t)).collect()
-        };
+        let vertices = map_with(surface.triangles.len(), memory, place);
         let ball = |vertices: &Vec<(DVec3, DVec3)>| {
             let centre = vertices.iter().map(|v| v.0).sum::<DVec3>() / vertices.len() as f64;
             (centre, vertices.iter().map(|v| v.0.distance(centre)).fold(0.0, f64::max))

@@ -17,14 +17,7 @@ const BELOW: f64 = 0.7;
 
 /// Thickness from which on a part is no longer thin for a tool, m; zero for the surface of a file, which has no radius.
 pub fn thickness_for(shape: &ToolShape) -> f64 {
-    THICK
-        * match *shape {
-            ToolShape::Sphere { radius } | ToolShape::Capsule { radius, .. } | ToolShape::Punch { radius, .. } => {
-                radius
-            }
-            ToolShape::Ellipsoid { semi_axes } => semi_axes.min_element(),
-            ToolShape::Surface(_) => 0.0,
-        }
+    if matches!(shape, ToolShape::Surface(_)) { 0.0 } else { THICK * shape.thickness() }
 }
 
 /// Whether a body ends within a thickness, m, below a point of its surface, along the inward normal.

@@ -2,8 +2,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::patch::{MAX_PATCH_NODES, Patch};
-use super::refusal::Refusal;
+use super::patch::{MAX_PATCH_NODES, Patch, Refusal};
 use crate::green::{GreensFunction, TouchNode};
 
 /// A patch with the columns of its nodes.

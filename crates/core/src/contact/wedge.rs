@@ -22,8 +22,6 @@ use crate::tensor::outer;
 
 /// `W`.
 const BAND: f64 = 2.5;
-/// Edges up to this distance from a triangle, over the radius, are listed for it: the band reaches so far three radii deep.
-pub const LISTED_INSIDE: f64 = 5.0;
 /// Cosine between the normal of a foot and that of an edge's face from which the foot lies on this face.
 const SAME_FACE: f64 = 0.5;
 /// Difference of depths beyond the band, over the radius, from which the other face is not looked for: faces may be curved.

@@ -10,8 +10,8 @@
 //! `S` is `alpha dt^2` times the effective stiffness of equation 4.4, and stays usable at `alpha = 0` (central
 //! difference). It is factorised once; `Solver::Inverse` keeps its dense inverse instead, which is the paper's method.
 
-use faer::dyn_stack::MemBuffer;
-use faer::{MatMut, Par};
+use faer::Par;
+use faer::dyn_stack::{MemBuffer, StackReq};
 
 use super::{Energy, Newmark, Rayleigh};
 use crate::fem::{Supports, SymmetricCsc};
@@ -125,8 +125,7 @@ impl Direct {
                 *x = -scratch.right[dof as usize];
             }
             let mut memory = factor.solve_scratch(1);
-            let rows = scratch.solution.len();
-            factor.solve_in_place(MatMut::from_column_major_slice_mut(&mut scratch.solution, rows, 1), &mut memory);
+            factor.solve_in_place(&mut scratch.solution, &mut memory);
             for (x, &dof) in scratch.solution.iter().zip(&self.supports.free) {
                 start.a[dof as usize] = *x;
             }
@@ -139,7 +138,7 @@ impl Direct {
         let (n, free) = (self.stiffness.dimension, self.supports.free.len());
         let memory = match &self.solved {
             StepSolver::Factor(factor) => factor.solve_scratch(1),
-            StepSolver::Inverse(_) => MemBuffer::new(faer::dyn_stack::StackReq::EMPTY),
+            StepSolver::Inverse(_) => MemBuffer::new(StackReq::EMPTY),
         };
         DirectScratch {
             mean_velocity: vec![0.0; n],
@@ -212,10 +211,7 @@ impl Direct {
     fn solve(&self, scratch: &mut DirectScratch) {
         let n = scratch.solution.len();
         match &self.solved {
-            StepSolver::Factor(factor) => {
-                let right = MatMut::from_column_major_slice_mut(&mut scratch.solution, n, 1);
-                factor.solve_in_place(right, &mut scratch.memory);
-            }
+            StepSolver::Factor(factor) => factor.solve_in_place(&mut scratch.solution, &mut scratch.memory),
             StepSolver::Inverse(inverse) => {
                 scratch.right[..n].copy_from_slice(&scratch.solution);
                 scratch.solution.fill(0.0);
@@ -269,11 +265,10 @@ fn inverse(factor: &Factor) -> Vec<f64> {
     let mut inverse = vec![0.0; n * n];
     let mut memory = factor.solve_scratch(BLOCK.min(n));
     for (block, columns) in inverse.chunks_mut(BLOCK * n).enumerate() {
-        let count = columns.len() / n;
-        for j in 0..count {
-            columns[j * n + block * BLOCK + j] = 1.0;
+        for (j, column) in columns.chunks_exact_mut(n).enumerate() {
+            column[block * BLOCK + j] = 1.0;
         }
-        factor.solve_in_place(MatMut::from_column_major_slice_mut(columns, n, count), &mut memory);
+        factor.solve_in_place(columns, &mut memory);
     }
     inverse
 }

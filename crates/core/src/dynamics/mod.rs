@@ -24,8 +24,7 @@ pub use direct::{Direct, DirectScratch, DirectState, Solver, partition};
 pub use energy::Energy;
 pub use integration::Integration;
 pub use modal::{
-    EnergyAccount, LANES, Lanes, LoadedPatch, ModalModel, ModalScratch, ModalState, PredictedState, Projection,
-    StepEnergy,
+    EnergyAccount, LANES, Lanes, LoadedPatch, ModalModel, ModalState, PredictedState, Projection, StepEnergy,
 };
 pub use scheme::{ModeStep, Newmark, Rayleigh};
 pub use store::{BASIS_VERSION, Basis, basis_key};

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use crate::Result;
 use crate::arrays_file::ArraysKind;
+use crate::green::add_sections;
 
 /// Version of the file's layout; part of the key.
 pub const BASIS_VERSION: u32 = 3;
@@ -26,10 +27,7 @@ pub struct Basis {
 pub fn basis_key(parts: &[&[u8]]) -> String {
     let mut hash = blake3::Hasher::new();
     hash.update(format!("palpate modes {BASIS_VERSION}").as_bytes());
-    for part in parts {
-        hash.update(&(part.len() as u64).to_le_bytes());
-        hash.update(part);
-    }
+    add_sections(&mut hash, parts.iter().copied());
     hash.finalize().to_hex().to_string()
 }
 

@@ -6,20 +6,26 @@
 use glam::{DMat3, DVec3};
 
 use super::entries::Entries;
+use super::function::GreensFunction;
 use super::node_order::TouchNode;
 use super::numbers::{Gather, Kernel, Stored, WeightedRow, column_sums};
 
 /// Nodes whose weighted rows are prepared at a time, on the stack.
 const TILE: usize = 64;
 
-impl Entries {
-    /// `W^T Psi W` of a patch; see [`super::GreensFunction::symmetric_block`].
-    pub fn symmetric_block(&self, columns: &[TouchNode], weights: &[f64]) -> DMat3 {
-        let half = self.numbers.run(self.arch, SymmetricHalf { entries: self, columns, weights });
+impl GreensFunction {
+    /// `W^T Psi W` of one patch, m/N: mean displacement per unit force, both weighted. `nodes[i]` and `columns[i]` are the
+    /// same node. Each pair of nodes is read once; supported dofs contribute nothing; the result is symmetric to the bit.
+    /// Never allocates.
+    pub fn symmetric_block(&self, nodes: &[u32], columns: &[TouchNode], weights: &[f64]) -> DMat3 {
+        debug_assert!(nodes.iter().zip(columns).all(|(&n, &c)| self.touchable(n as usize) == Some(c)));
+        let entries = &self.entries;
+        let half = entries.numbers.run(entries.arch, SymmetricHalf { entries, columns, weights });
         half + half.transpose()
     }
 
-    /// `W_a^T Psi W_b` of two patches; see [`super::GreensFunction::weighted_block`].
+    /// `W_a^T Psi W_b`, m/N: mean displacement of the nodes `a` (any of the surface) per unit force spread over the columns
+    /// `b`, axis of the force by column. Supported dofs contribute nothing. Never allocates while the nodes are resident.
     pub fn weighted_block(
         &self,
         nodes: &[u32],
@@ -27,15 +33,16 @@ impl Entries {
         columns: &[TouchNode],
         column_weights: &[f64],
     ) -> DMat3 {
-        let block = Weighted { entries: self, nodes, node_weights, columns, column_weights };
-        let mut sum = self.numbers.run(self.arch, block);
-        if self.resident < 3 * self.free.len() {
+        let entries = &self.entries;
+        let block = Weighted { entries, nodes, node_weights, columns, column_weights };
+        let mut sum = entries.numbers.run(entries.arch, block);
+        if entries.resident < 3 * entries.free.len() {
             sum += self.weighted_from_file(nodes, node_weights, columns, column_weights);
         }
         sum
     }
 
-    /// The part of [`Entries::weighted_block`] whose rows are not in memory.
+    /// The part of [`Self::weighted_block`] whose rows are not in memory.
     fn weighted_from_file(
         &self,
         nodes: &[u32],
@@ -43,14 +50,14 @@ impl Entries {
         columns: &[TouchNode],
         column_weights: &[f64],
     ) -> DMat3 {
-        let mut sum = DMat3::ZERO;
+        let (entries, mut sum) = (&self.entries, DMat3::ZERO);
         for (&node, &weight) in nodes.iter().zip(node_weights).filter(|(node, _)| !self.is_resident(**node as usize)) {
-            let place = self.node_order.place(node as usize);
-            let [x, y, z, _] = self.free[place];
+            let place = entries.node_order.place(node as usize);
+            let [x, y, z, _] = entries.free[place];
             for (column, &other) in columns.iter().zip(column_weights) {
-                let factors = self.free[column.place()];
+                let factors = entries.free[column.place()];
                 for axis in 0..3 {
-                    let numbers = DVec3::from(self.read_from_file::<3>(3 * place, 3 * column.place() + axis));
+                    let numbers = DVec3::from(entries.read_from_file::<3>(3 * place, 3 * column.place() + axis));
                     *sum.col_mut(axis) += factors[axis] * weight * other * (DVec3::new(x, y, z) * numbers);
                 }
             }
@@ -58,29 +65,33 @@ impl Entries {
         sum
     }
 
-    /// The entries between nodes; see [`super::GreensFunction::block`].
+    /// Copies the entries of row nodes and column nodes to `out`: columns contiguous, `3 rows` by `3 columns`, three a
+    /// node. Supported dofs stand there with their own entries.
     pub fn block(&self, rows: &[u32], columns: &[TouchNode], out: &mut [f64]) {
-        let places: Vec<usize> = rows.iter().map(|&node| 3 * self.node_order.place(node as usize)).collect();
+        let entries = &self.entries;
+        let places: Vec<usize> = rows.iter().map(|&node| 3 * entries.node_order.place(node as usize)).collect();
         let columns: Vec<usize> = columns.iter().flat_map(|c| (0..3).map(|axis| 3 * c.place() + axis)).collect();
-        let starts: Vec<usize> = columns.iter().map(|column| column * self.resident).collect();
+        let starts: Vec<usize> = columns.iter().map(|column| column * entries.resident).collect();
         // Rows that are not in memory: first the column's head, which is, in their place.
-        let at: Vec<usize> = places.iter().map(|&row| if row < self.resident { row } else { 0 }).collect();
-        self.numbers.run(self.arch, Gather { rows: &at, starts: &starts, out });
-        if self.scale.is_empty() && self.file.is_none() {
+        let at: Vec<usize> = places.iter().map(|&row| if row < entries.resident { row } else { 0 }).collect();
+        entries.numbers.run(entries.arch, Gather { rows: &at, starts: &starts, out });
+        if entries.scale.is_empty() && entries.file.is_none() {
             return;
         }
         for (out, &column) in out.chunks_exact_mut(3 * places.len()).zip(&columns) {
             for (out, &row) in out.chunks_exact_mut(3).zip(&places) {
-                if row >= self.resident {
-                    out.copy_from_slice(&self.read_from_file::<3>(row, column));
+                if row >= entries.resident {
+                    out.copy_from_slice(&entries.read_from_file::<3>(row, column));
                 }
                 for (k, value) in out.iter_mut().enumerate() {
-                    *value *= self.scale_of(row + k) * self.scale_of(column);
+                    *value *= entries.scale_of(row + k) * entries.scale_of(column);
                 }
             }
         }
     }
+}
 
+impl Entries {
     fn starts(&self, column: TouchNode) -> [usize; 3] {
         [0, 1, 2].map(|axis| (3 * column.place() + axis) * self.resident)
     }

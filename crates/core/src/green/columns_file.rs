@@ -47,7 +47,6 @@ impl ColumnsFile {
     }
 
     fn cut_short(&self) -> Error {
-        let reason = "was cut short while in use; compute it again".into();
-        Error::Store { path: self.path.clone(), reason }
+        Error::store(&self.path, "was cut short while in use; compute it again")
     }
 }

@@ -6,15 +6,14 @@
 //!
 //! A store up to a bound is in memory as a whole. Of a larger one the square of touchable rows and columns is, which is all
 //! that contacts ask for; other rows are read from the file by position. Nothing is mapped, so a file that somebody cuts
-//! short can kill no reader: what cannot be read any more is NaN, and [`Entries::require_intact`] says beforehand why. The
+//! short can kill no reader: what cannot be read any more is NaN, and [`GreensFunction::require_intact`] says beforehand why. The
 //! file's length is compared there; should it shrink between that call and the reading, the answer is NaN, which the
 //! checks behind every answer refuse.
 
-use glam::DVec3;
 use pulp::Arch;
 
 use super::columns_file::ColumnsFile;
-use super::node_order::{NodeOrder, TouchNode};
+use super::node_order::NodeOrder;
 use super::numbers::{AddColumns, COLUMNS_AT_ONCE, Numbers, One};
 use super::precision::Precision;
 use crate::Result;
@@ -34,12 +33,12 @@ pub struct Entries {
     pub(super) arch: Arch,
     pub(super) node_order: NodeOrder,
     /// Numbers of a column.
-    rows: usize,
+    pub(super) rows: usize,
     /// Numbers of a column that are in memory: all, or those of the touchable nodes.
     pub(super) resident: usize,
     pub(super) numbers: Numbers,
     /// Bound `s_i` of each stored row, `|Psi_ij| <= s_i s_j`; empty where nothing is computed yet.
-    magnitude: Vec<f64>,
+    pub(super) magnitude: Vec<f64>,
     /// Scale of each stored row, and of the column that belongs to it; empty unless the numbers are integers.
     pub(super) scale: Vec<f64>,
     /// For each place the scales of its dofs, zero on supported ones: they neither move nor are pushed.
@@ -86,21 +85,6 @@ impl Entries {
         self.numbers.precision()
     }
 
-    /// Where the nodes are.
-    pub(super) fn node_order(&self) -> &NodeOrder {
-        &self.node_order
-    }
-
-    /// Bounds of the stored rows.
-    pub(super) fn magnitudes(&self) -> &[f64] {
-        &self.magnitude
-    }
-
-    /// Bound `s_i` of a row in the user's order.
-    pub fn magnitude(&self, row: usize) -> f64 {
-        self.magnitude.get(self.node_order.stored_row(row)).copied().unwrap_or(0.0)
-    }
-
     /// Hands the bytes of all columns to `put`, as first column and bytes.
     pub(super) fn each_bytes(&self, put: &mut dyn FnMut(usize, &[u8]) -> Result<()>) -> Result<()> {
         let Some(file) = &self.file else { return put(0, self.numbers.bytes()) };
@@ -112,71 +96,8 @@ impl Entries {
         Ok(())
     }
 
-    /// Whether everything can still be read.
-    pub fn is_intact(&self) -> bool {
-        self.file.as_ref().is_none_or(ColumnsFile::is_intact)
-    }
-
-    /// Refuses a store that was cut short since it was loaded, where what is in memory is not all.
-    ///
-    /// # Errors
-    /// [`crate::Error::Store`].
-    pub fn require_intact(&self) -> Result<()> {
-        self.file.as_ref().map_or(Ok(()), ColumnsFile::require_intact)
-    }
-
-    /// Whether the rows of a surface node are in memory.
-    pub fn is_resident(&self, node: usize) -> bool {
-        3 * self.node_order.place(node) < self.resident
-    }
-
-    /// Entry of a row and a column in the user's order.
-    pub fn entry(&self, row: usize, column: TouchNode, axis: usize) -> f64 {
-        let (row, column) = (self.node_order.stored_row(row), 3 * column.place() + axis);
-        let value = if row < self.resident {
-            self.numbers.run(self.arch, One(column * self.resident + row))
-        } else {
-            self.read_from_file::<1>(row, column)[0]
-        };
-        // The product of the scales first: it is the same for the mirrored entry.
-        self.scale_of(row) * self.scale_of(column) * value
-    }
-
-    /// `out += factor * Psi(rows, column)` for all rows in the user's order.
-    pub fn add_column(&self, column: TouchNode, axis: usize, factor: f64, out: &mut [f64]) {
-        let column = 3 * column.place() + axis;
-        let mut sums = vec![0.0; self.rows];
-        self.add_columns(&[(column, factor * self.scale_of(column))], &mut sums);
-        let (surface, inside) = sums.split_at(3 * self.free.len());
-        for (place, (&node, sums)) in self.node_order.nodes().iter().zip(surface.chunks_exact(3)).enumerate() {
-            for (axis, sum) in sums.iter().enumerate() {
-                out[3 * node as usize + axis] += self.scale_of(3 * place + axis) * sum;
-            }
-        }
-        for (row, sum) in (surface.len()..).zip(inside) {
-            out[row] += self.scale_of(row) * sum;
-        }
-    }
-
-    /// Adds the displacements of all surface dofs (user's order, 3s) under `forces`, N; supported dofs neither take a force
-    /// nor move.
-    pub fn add_forces(&self, forces: &[(TouchNode, DVec3)], out: &mut [f64]) {
-        let of_node = |&(node, force): &(TouchNode, DVec3)| {
-            let free = self.free[node.place()];
-            (0..3).map(move |axis| (3 * node.place() + axis, free[axis] * force[axis]))
-        };
-        let columns: Vec<(usize, f64)> = forces.iter().flat_map(of_node).filter(|&(_, factor)| factor != 0.0).collect();
-        let mut sums = vec![0.0; 3 * self.free.len()];
-        self.add_columns(&columns, &mut sums);
-        for (place, (&node, sums)) in self.node_order.nodes().iter().zip(sums.chunks_exact(3)).enumerate() {
-            for axis in 0..3 {
-                out[3 * node as usize + axis] += self.free[place][axis] * sums[axis];
-            }
-        }
-    }
-
     /// `sums += factor * column` over the first stored rows, for stored columns and factors; NaN where the file fails.
-    fn add_columns(&self, columns: &[(usize, f64)], sums: &mut [f64]) {
+    pub(super) fn add_columns(&self, columns: &[(usize, f64)], sums: &mut [f64]) {
         let mut read = self.file.as_ref().map(|_| Numbers::zeros(self.precision(), COLUMNS_AT_ONCE * sums.len()));
         for group in columns.chunks(COLUMNS_AT_ONCE) {
             // The last group is filled up with nothing times its first column.

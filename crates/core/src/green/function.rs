@@ -2,11 +2,13 @@
 
 use std::path::PathBuf;
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
 use super::accuracy::Accuracy;
+use super::columns_file::ColumnsFile;
 use super::entries::Entries;
 use super::node_order::TouchNode;
+use super::numbers::One;
 use super::precision::Precision;
 use crate::Result;
 use crate::memory::Ranges;
@@ -69,80 +71,14 @@ impl GreensFunction {
         self.entries.precision()
     }
 
-    /// Bound `s_i` of a row: `|Psi_ij| <= s_i s_j`; the root of a compliance, and of a stiffness on supported rows.
-    pub fn magnitude(&self, row: usize) -> f64 {
-        self.entries.magnitude(row)
-    }
-
     /// The columns of surface node `node`; `None` if it may not be touched.
     pub fn touchable(&self, node: usize) -> Option<TouchNode> {
-        self.entries.node_order().touchable(node)
+        self.entries.node_order.touchable(node)
     }
 
     /// One for each axis along which surface node `node` is free, zero for one along which it is supported.
     pub fn free_axes(&self, node: usize) -> DVec3 {
         DVec3::from_array(std::array::from_fn(|axis| if self.row_is_fixed[3 * node + axis] { 0.0 } else { 1.0 }))
-    }
-
-    /// Whether the rows of surface node `node` are in memory, so that a tick may ask for them; those of touchable nodes are.
-    pub fn is_resident(&self, node: usize) -> bool {
-        self.entries.is_resident(node)
-    }
-
-    /// Whether everything can still be read: `false` once somebody has cut the file short. Costs a call of the system.
-    pub fn is_intact(&self) -> bool {
-        self.entries.is_intact()
-    }
-
-    /// To be called before whole columns are read ([`Self::add_forces`], [`Self::add_column`], rows of nodes that are
-    /// not resident): they are NaN where the file has been cut short.
-    ///
-    /// # Errors
-    /// [`crate::Error::Store`] for a file that was cut short while in use.
-    pub fn require_intact(&self) -> Result<()> {
-        self.entries.require_intact()
-    }
-
-    /// `W^T Psi W` of one patch, m/N: mean displacement per unit force, both weighted. `nodes[i]` and `columns[i]` are the
-    /// same node. Each pair of nodes is read once; supported dofs contribute nothing; the result is symmetric to the bit.
-    /// Never allocates.
-    pub fn symmetric_block(&self, nodes: &[u32], columns: &[TouchNode], weights: &[f64]) -> DMat3 {
-        debug_assert!(nodes.iter().zip(columns).all(|(&n, &c)| self.touchable(n as usize) == Some(c)));
-        self.entries.symmetric_block(columns, weights)
-    }
-
-    /// `W_a^T Psi W_b`, m/N: mean displacement of the nodes `a` (any of the surface) per unit force spread over the columns
-    /// `b`, axis of the force by column. Supported dofs contribute nothing. Never allocates while the nodes are resident.
-    pub fn weighted_block(
-        &self,
-        nodes: &[u32],
-        node_weights: &[f64],
-        columns: &[TouchNode],
-        column_weights: &[f64],
-    ) -> DMat3 {
-        self.entries.weighted_block(nodes, node_weights, columns, column_weights)
-    }
-
-    /// Copies the entries of row nodes and column nodes to `out`: columns contiguous, `3 rows` by `3 columns`, three a
-    /// node. Supported dofs stand there with their own entries.
-    pub fn block(&self, rows: &[u32], columns: &[TouchNode], out: &mut [f64]) {
-        self.entries.block(rows, columns, out);
-    }
-
-    /// Entry of row `row` and column `column`.
-    pub fn entry(&self, row: usize, column: usize) -> f64 {
-        self.entries.entry(row, self.node_of_column(column), column % 3)
-    }
-
-    /// `out += factor * Psi(:, column)`, on all rows.
-    pub fn add_column(&self, column: usize, factor: f64, out: &mut [f64]) {
-        self.entries.add_column(self.node_of_column(column), column % 3, factor, out);
-    }
-
-    /// Adds `Psi f` to the displacements (m) of all surface dofs (3s) for forces on nodes, N; supported dofs take no force
-    /// and do not move. Made for frames: each column is read once, in the order of the store.
-    pub fn add_forces(&self, forces: &[(TouchNode, DVec3)], out: &mut [f64]) {
-        self.entries.add_forces(forces, out);
     }
 
     /// Reference load on the dof of surface row `row`, N.
@@ -167,7 +103,80 @@ impl GreensFunction {
         3 * self.touch[column / 3] as usize + column % 3
     }
 
-    fn node_of_column(&self, column: usize) -> TouchNode {
-        self.entries.node_order().touch_node(self.touch[column / 3])
+    /// Bound `s_i` of a row: `|Psi_ij| <= s_i s_j`; the root of a compliance, and of a stiffness on supported rows.
+    pub fn magnitude(&self, row: usize) -> f64 {
+        let entries = &self.entries;
+        entries.magnitude.get(entries.node_order.stored_row(row)).copied().unwrap_or(0.0)
+    }
+
+    /// Whether the rows of surface node `node` are in memory, so that a tick may ask for them; those of touchable nodes are.
+    pub fn is_resident(&self, node: usize) -> bool {
+        3 * self.entries.node_order.place(node) < self.entries.resident
+    }
+
+    /// Whether everything can still be read: `false` once somebody has cut the file short. Costs a call of the system.
+    pub fn is_intact(&self) -> bool {
+        self.entries.file.as_ref().is_none_or(ColumnsFile::is_intact)
+    }
+
+    /// To be called before whole columns are read ([`Self::add_forces`], [`Self::add_column`], rows of nodes that are
+    /// not resident): they are NaN where the file has been cut short.
+    ///
+    /// # Errors
+    /// [`crate::Error::Store`] for a file that was cut short while in use.
+    pub fn require_intact(&self) -> Result<()> {
+        self.entries.file.as_ref().map_or(Ok(()), ColumnsFile::require_intact)
+    }
+
+    /// Entry of row `row` and column `column`.
+    pub fn entry(&self, row: usize, column: usize) -> f64 {
+        let entries = &self.entries;
+        let (row, column) = (entries.node_order.stored_row(row), self.stored_column(column));
+        let value = if row < entries.resident {
+            entries.numbers.run(entries.arch, One(column * entries.resident + row))
+        } else {
+            entries.read_from_file::<1>(row, column)[0]
+        };
+        // The product of the scales first: it is the same for the mirrored entry.
+        entries.scale_of(row) * entries.scale_of(column) * value
+    }
+
+    /// `out += factor * Psi(:, column)`, on all rows.
+    pub fn add_column(&self, column: usize, factor: f64, out: &mut [f64]) {
+        let (entries, column) = (&self.entries, self.stored_column(column));
+        let mut sums = vec![0.0; entries.rows];
+        entries.add_columns(&[(column, factor * entries.scale_of(column))], &mut sums);
+        let (surface, inside) = sums.split_at(3 * entries.free.len());
+        for (place, (&node, sums)) in entries.node_order.nodes().iter().zip(surface.chunks_exact(3)).enumerate() {
+            for (axis, sum) in sums.iter().enumerate() {
+                out[3 * node as usize + axis] += entries.scale_of(3 * place + axis) * sum;
+            }
+        }
+        for (row, sum) in (surface.len()..).zip(inside) {
+            out[row] += entries.scale_of(row) * sum;
+        }
+    }
+
+    /// Adds `Psi f` to the displacements (m) of all surface dofs (3s) for forces on nodes, N; supported dofs take no force
+    /// and do not move. Made for frames: each column is read once, in the order of the store.
+    pub fn add_forces(&self, forces: &[(TouchNode, DVec3)], out: &mut [f64]) {
+        let entries = &self.entries;
+        let of_node = |&(node, force): &(TouchNode, DVec3)| {
+            let free = entries.free[node.place()];
+            (0..3).map(move |axis| (3 * node.place() + axis, free[axis] * force[axis]))
+        };
+        let columns: Vec<(usize, f64)> = forces.iter().flat_map(of_node).filter(|&(_, factor)| factor != 0.0).collect();
+        let mut sums = vec![0.0; 3 * entries.free.len()];
+        entries.add_columns(&columns, &mut sums);
+        for (place, (&node, sums)) in entries.node_order.nodes().iter().zip(sums.chunks_exact(3)).enumerate() {
+            for axis in 0..3 {
+                out[3 * node as usize + axis] += entries.free[place][axis] * sums[axis];
+            }
+        }
+    }
+
+    /// Column of the store for a column in the user's order.
+    fn stored_column(&self, column: usize) -> usize {
+        self.entries.node_order.stored_row(self.row_of_column(column))
     }
 }

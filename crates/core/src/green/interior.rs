@@ -5,9 +5,8 @@
 //! a factor smaller than that of the body, far too long for the force loop, short enough for a frame.
 
 use faer::Par;
-use faer::dyn_stack::MemBuffer;
-use faer::mat::MatMut;
 
+use super::Extension;
 use crate::fem::{Supports, SymmetricCsc};
 use crate::solver::Factor;
 use crate::{Error, Result};
@@ -66,45 +65,6 @@ impl Interior {
         Ok(interior)
     }
 
-    /// Displacements of all dofs, m, for those of the surface dofs.
-    ///
-    /// # Errors
-    /// A length that is not three a surface node.
-    pub fn extend(&self, surface: &[f64]) -> Result<Vec<f64>> {
-        let rows = 3 * self.surface_nodes.len();
-        if surface.len() != rows {
-            let (count, given) = (self.surface_nodes.len(), surface.len());
-            return Err(Error::Invalid(format!(
-                "displacements of {count} surface nodes are needed, got {given} numbers"
-            )));
-        }
-        Ok(self.extended(surface, true))
-    }
-
-    /// Changes of the displacements of all dofs for changes of those of the surface dofs, the reference loads staying as
-    /// they are: several fields (3s each) one after the other, in a single solve.
-    ///
-    /// # Errors
-    /// A length that is not a multiple of three a surface node.
-    pub fn extend_responses(&self, fields: &[f64]) -> Result<Vec<f64>> {
-        let rows = 3 * self.surface_nodes.len();
-        if fields.is_empty() || !fields.len().is_multiple_of(rows) {
-            let given = fields.len();
-            return Err(Error::Invalid(format!("fields of {rows} surface dofs are needed, got {given} numbers")));
-        }
-        Ok(self.extended(fields, false))
-    }
-
-    /// Number of surface nodes.
-    pub fn surface_count(&self) -> usize {
-        self.surface_nodes.len()
-    }
-
-    /// Number of dofs of the whole mesh.
-    pub fn dof_count(&self) -> usize {
-        self.dof_count
-    }
-
     fn extended(&self, fields: &[f64], loaded: bool) -> Vec<f64> {
         let count = fields.len() / (3 * self.surface_nodes.len());
         let mut all = vec![0.0; count * self.dof_count];
@@ -120,8 +80,8 @@ impl Interior {
             self.load(field, loaded, right);
         }
         // One solve for all fields: the factor, which is larger than the caches, is read once.
-        let mut memory: MemBuffer = factor.solve_scratch(count);
-        factor.solve_in_place(MatMut::from_column_major_slice_mut(&mut right, rows, count), &mut memory);
+        let mut memory = factor.solve_scratch(count);
+        factor.solve_in_place(&mut right, &mut memory);
         for (field, right) in all.chunks_exact_mut(self.dof_count).zip(right.chunks_exact(rows)) {
             for (&dof, &u) in self.inner.iter().zip(right) {
                 field[dof as usize] = u;
@@ -137,5 +97,35 @@ impl Interior {
             let load = if loaded { own } else { 0.0 };
             *right = load - row.iter().map(|&(dof, k)| k * field[dof as usize]).sum::<f64>();
         }
+    }
+}
+
+impl Extension for Interior {
+    fn extend(&self, surface: &[f64]) -> Result<Vec<f64>> {
+        let rows = 3 * self.surface_nodes.len();
+        if surface.len() != rows {
+            let (count, given) = (self.surface_nodes.len(), surface.len());
+            return Err(Error::Invalid(format!(
+                "displacements of {count} surface nodes are needed, got {given} numbers"
+            )));
+        }
+        Ok(self.extended(surface, true))
+    }
+
+    fn extend_responses(&self, fields: &[f64]) -> Result<Vec<f64>> {
+        let rows = 3 * self.surface_nodes.len();
+        if fields.is_empty() || !fields.len().is_multiple_of(rows) {
+            let given = fields.len();
+            return Err(Error::Invalid(format!("fields of {rows} surface dofs are needed, got {given} numbers")));
+        }
+        Ok(self.extended(fields, false))
+    }
+
+    fn surface_count(&self) -> usize {
+        self.surface_nodes.len()
+    }
+
+    fn dof_count(&self) -> usize {
+        self.dof_count
     }
 }

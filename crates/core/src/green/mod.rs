@@ -20,8 +20,6 @@ mod function;
 #[cfg(feature = "offline")]
 mod interior;
 mod key;
-#[cfg(all(feature = "strain", not(feature = "offline")))]
-mod no_interior;
 mod node_order;
 mod numbers;
 mod packed;
@@ -35,8 +33,7 @@ pub use function::GreensFunction;
 #[cfg(feature = "offline")]
 pub use interior::Interior;
 pub use key::FORMAT_VERSION;
-#[cfg(all(feature = "strain", not(feature = "offline")))]
-pub use no_interior::Interior;
+pub(crate) use key::add_sections;
 pub use node_order::TouchNode;
 pub use precision::Precision;
 #[cfg(feature = "offline")]
@@ -46,3 +43,26 @@ pub use precompute::{
     AssembledProblem, Claim, ColumnStore, Columns, Growth, Measurement, Phase, PhaseCallback, Plan, PreviousWork,
     Problem, Progress, RequestedPrecision, Target, TaskMemory, checksum, plan, precompute, precompute_to, products,
 };
+
+/// What extends displacements of a body's surface to all nodes.
+#[cfg(feature = "strain")]
+pub trait Extension: Send + Sync {
+    /// Displacements of all dofs, m, for those of the surface dofs.
+    ///
+    /// # Errors
+    /// A length that is not three a surface node.
+    fn extend(&self, surface: &[f64]) -> crate::Result<Vec<f64>>;
+
+    /// Changes of the displacements of all dofs for changes of those of the surface dofs, the reference loads staying as
+    /// they are: several fields (3s each) one after the other, in a single solve.
+    ///
+    /// # Errors
+    /// A length that is not a multiple of three a surface node.
+    fn extend_responses(&self, fields: &[f64]) -> crate::Result<Vec<f64>>;
+
+    /// Number of surface nodes.
+    fn surface_count(&self) -> usize;
+
+    /// Number of dofs of the whole mesh.
+    fn dof_count(&self) -> usize;
+}

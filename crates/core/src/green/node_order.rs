@@ -69,11 +69,6 @@ impl NodeOrder {
         self.places.get(node).copied().filter(|&place| (place as usize) < self.touchable).map(TouchNode)
     }
 
-    /// The columns of a surface node that is touchable.
-    pub(super) fn touch_node(&self, node: u32) -> TouchNode {
-        TouchNode(self.places[node as usize])
-    }
-
     /// Row of the store for a row in the user's order: surface dofs first, then supported dofs inside, which stay.
     pub fn stored_row(&self, row: usize) -> usize {
         match self.places.get(row / 3) {

@@ -10,31 +10,17 @@ use super::precision::Precision;
 use crate::{Error, Result};
 
 /// A number as it is stored.
-pub trait Stored: Pod {
+pub trait Stored: Pod + Into<f64> {
     /// Its value, before the scales of [`Precision::F16`].
-    fn value(self) -> f64;
-}
-
-impl Stored for i16 {
     #[inline(always)]
     fn value(self) -> f64 {
-        f64::from(self)
+        self.into()
     }
 }
 
-impl Stored for f32 {
-    #[inline(always)]
-    fn value(self) -> f64 {
-        f64::from(self)
-    }
-}
-
-impl Stored for f64 {
-    #[inline(always)]
-    fn value(self) -> f64 {
-        self
-    }
-}
+impl Stored for i16 {}
+impl Stored for f32 {}
+impl Stored for f64 {}
 
 /// Columns in memory, one after the other.
 pub enum Numbers {
@@ -114,18 +100,9 @@ impl Numbers {
     /// The bytes of all of them, to be filled.
     pub fn bytes_mut(&mut self) -> &mut [u8] {
         match self {
-            Numbers::F16(v) => {
-                let end = v.len() - PADDING;
-                bytemuck::cast_slice_mut(&mut v[..end])
-            }
-            Numbers::F32(v) => {
-                let end = v.len() - PADDING;
-                bytemuck::cast_slice_mut(&mut v[..end])
-            }
-            Numbers::F64(v) => {
-                let end = v.len() - PADDING;
-                bytemuck::cast_slice_mut(&mut v[..end])
-            }
+            Numbers::F16(v) => unpadded_mut(v),
+            Numbers::F32(v) => unpadded_mut(v),
+            Numbers::F64(v) => unpadded_mut(v),
         }
     }
 
@@ -137,6 +114,11 @@ impl Numbers {
             Numbers::F64(v) => arch.dispatch(KernelCall(kernel, v)),
         }
     }
+}
+
+fn unpadded_mut<T: Pod>(numbers: &mut [T]) -> &mut [u8] {
+    let end = numbers.len() - PADDING;
+    bytemuck::cast_slice_mut(&mut numbers[..end])
 }
 
 /// A node as row of a weighted sum: its first number in a column, and what its three numbers are multiplied by.

@@ -5,16 +5,14 @@
 //! space, and all numbers by planes of bytes: what a general compressor makes small. The numbers themselves are those of the
 //! store, so that forces are the same to the bit.
 
-use std::path::Path;
-
 use safetensors::tensor::{Dtype, SafeTensors};
 
 use super::entries::Entries;
 use super::function::GreensFunction;
 use super::numbers::Numbers;
 use super::precision::Precision;
-use super::store_writer::Header;
-use crate::{Error, Result};
+use super::store_writer::header_of;
+use crate::Result;
 
 /// The block that stands for the operator.
 pub(super) const BLOCK: &str = "packed";
@@ -31,7 +29,7 @@ impl GreensFunction {
         self.require_intact()?;
         let block = self.entries.packed();
         let small = self.small_tensors();
-        let mut header = Header::new(self, self.precision());
+        let mut header = header_of(self, self.precision());
         header.text(SUM, blake3::hash(&block).to_hex().as_str());
         header.tensor(BLOCK, Dtype::U8, &[block.len()], block.len());
         for (name, dtype, shape, data) in &small {
@@ -57,7 +55,7 @@ impl Layout {
     fn of(entries: &Entries) -> Self {
         let dofs = (0..entries.free.len()).flat_map(|place| (0..3).map(move |axis| (place, axis)));
         let free = dofs.filter(|&(place, axis)| entries.free[place][axis] != 0.0).map(|(place, axis)| 3 * place + axis);
-        let end = 3 * entries.node_order().touchable_count();
+        let end = 3 * entries.node_order.touchable_count();
         let (square, below) = free.partition(|&row| row < end);
         Self { square, below }
     }
@@ -106,7 +104,7 @@ impl Entries {
     fn predicted(&self, layout: &Layout, rank: usize, row: usize, word: impl Fn(usize, usize) -> u64) -> u64 {
         match rank.checked_sub(AXES) {
             // Above the diagonal of that column, or below the square: read before.
-            Some(before) if row <= layout.square[before] || row >= 3 * self.node_order().touchable_count() => {
+            Some(before) if row <= layout.square[before] || row >= 3 * self.node_order.touchable_count() => {
                 word(row, layout.square[before])
             }
             _ => 0,
@@ -140,7 +138,7 @@ impl Entries {
         if planes.len() != count * width {
             return None;
         }
-        let square_end = 3 * self.node_order().touchable_count();
+        let square_end = 3 * self.node_order.touchable_count();
         let mut numbers = std::mem::replace(&mut self.numbers, Numbers::zeros(Precision::F16, 0));
         let mut at = 0;
         layout.each(|rank, row| {
@@ -182,9 +180,4 @@ fn zigzag(difference: u16) -> u16 {
 
 fn unzigzag(word: u16) -> u16 {
     (word >> 1) ^ (word & 1).wrapping_neg()
-}
-
-/// What a damaged block is called.
-pub(super) fn damaged(path: &Path) -> Error {
-    Error::Store { path: path.to_owned(), reason: "is damaged (its packed numbers); write it again".into() }
 }

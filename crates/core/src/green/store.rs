@@ -10,7 +10,6 @@
 //!   file that shrinks between that comparison and the reading yields NaN. Its checksums are not taken again: bytes that
 //!   somebody overwrites in place, at the same length, are not noticed.
 
-use std::collections::HashMap;
 use std::path::Path;
 
 use safetensors::tensor::{Dtype, Metadata, TensorInfo};
@@ -51,42 +50,15 @@ impl GreensFunction {
 #[cfg(feature = "offline")]
 pub fn touch_of_store(path: &Path) -> Option<(String, Vec<u32>)> {
     let reader = Reader::open(path).ok()?;
-    let metadata = reader.tensors.metadata().clone().unwrap_or_default();
-    check_metadata(&reader, &metadata, None).ok()?;
-    Some((metadata.get("key")?.clone(), reader.numbers("touch").ok()?))
+    reader.check_texts(None).ok()?;
+    Some((reader.text("key").to_string(), reader.numbers("touch").ok()?))
 }
 
 /// Holds operators of up to `resident_bytes` as a whole.
 fn load_within(path: &Path, expected_key: Option<&str>, resident_bytes: usize) -> Result<GreensFunction> {
     let reader = Reader::open(path)?;
-    let metadata = reader.tensors.metadata().clone().unwrap_or_default();
-    check_metadata(&reader, &metadata, expected_key)?;
-    reader.green(&metadata, resident_bytes)
-}
-
-fn check_metadata(reader: &Reader<'_>, metadata: &HashMap<String, String>, expected_key: Option<&str>) -> Result<()> {
-    let path = reader.path;
-    let field = |name: &str| metadata.get(name).map_or("", String::as_str);
-    if field("format") != "palpate-green" {
-        return Err(store_error(path, "is not a Palpate Green's function"));
-    }
-    if field("version") != FORMAT_VERSION.to_string() {
-        let version = field("version");
-        return Err(store_error(
-            path,
-            format!("has format version {version}, this program reads {FORMAT_VERSION}; compute it again"),
-        ));
-    }
-    if !reader.sealed {
-        return Err(reader.damaged("the checksum of its header differs"));
-    }
-    match expected_key {
-        Some(key) if key != field("key") => Err(store_error(
-            path,
-            "was made for another body (mesh, material, supports, loads, touch region or precision differ); compute it again",
-        )),
-        _ => Ok(()),
-    }
+    reader.check_texts(expected_key)?;
+    reader.green(resident_bytes)
 }
 
 struct Reader<'a> {
@@ -108,9 +80,9 @@ impl<'a> Reader<'a> {
         let file = open(path).map_err(io)?;
         let length = file.length().map_err(io)?;
         if length == 0 {
-            return Err(store_error(path, "is empty"));
+            return Err(Error::store(path, "is empty"));
         }
-        let foreign = || store_error(path, "is not a Palpate store, or is cut short; compute it again");
+        let foreign = || Error::store(path, "is not a Palpate store, or is cut short; compute it again");
         let mut count = [0; 8];
         file.read_exact_at(&mut count, 0).map_err(|_| foreign())?;
         let count = u64::from_le_bytes(count);
@@ -127,8 +99,35 @@ impl<'a> Reader<'a> {
         Ok(Self { path, file, length, sealed: is_sealed(&head), tensors, start })
     }
 
+    /// A text of the header; empty where there is none.
+    fn text(&self, name: &str) -> &str {
+        self.tensors.metadata().as_ref().and_then(|texts| texts.get(name)).map_or("", String::as_str)
+    }
+
+    fn check_texts(&self, expected_key: Option<&str>) -> Result<()> {
+        if self.text("format") != "palpate-green" {
+            return Err(Error::store(self.path, "is not a Palpate Green's function"));
+        }
+        let version = self.text("version");
+        if version != FORMAT_VERSION.to_string() {
+            let reason = format!("has format version {version}, this program reads {FORMAT_VERSION}; compute it again");
+            return Err(Error::store(self.path, reason));
+        }
+        if !self.sealed {
+            return Err(self.damaged("the checksum of its header differs"));
+        }
+        match expected_key {
+            Some(key) if key != self.text("key") => Err(Error::store(
+                self.path,
+                "was made for another body (mesh, material, supports, loads, touch region or precision differ); \
+                compute it again",
+            )),
+            _ => Ok(()),
+        }
+    }
+
     fn damaged(&self, what: &str) -> Error {
-        store_error(self.path, format!("is damaged ({what}); compute it again"))
+        Error::store(self.path, format!("is damaged ({what}); compute it again"))
     }
 
     fn io(&self, source: std::io::Error) -> Error {
@@ -164,8 +163,7 @@ impl<'a> Reader<'a> {
         if self.tensors.info(name).is_some() { self.numbers(name) } else { Ok(Vec::new()) }
     }
 
-    fn green(self, metadata: &HashMap<String, String>, resident_bytes: usize) -> Result<GreensFunction> {
-        let field = |name: &str| metadata.get(name).cloned().unwrap_or_default();
+    fn green(self, resident_bytes: usize) -> Result<GreensFunction> {
         let positions: Vec<[f64; 3]> = self.numbers("surface_positions")?;
         let positions = positions.into_iter().map(glam::DVec3::from).collect();
         let row_is_fixed: Vec<u8> = self.numbers("row_is_fixed")?;
@@ -178,7 +176,7 @@ impl<'a> Reader<'a> {
         if row_is_fixed.len() < 3 * surface_nodes.len() {
             return Err(self.damaged("rows are missing"));
         }
-        let precision = self.precision(metadata)?;
+        let precision = self.precision()?;
         let magnitude: Vec<f64> = self.numbers("magnitude")?;
         if magnitude.len() != row_is_fixed.len() {
             return Err(self.damaged("the magnitudes do not match the operator"));
@@ -198,9 +196,9 @@ impl<'a> Reader<'a> {
             accuracy,
             loads: self.optional("loads")?,
             free_response: self.optional("free_response")?,
-            key: field("key"),
-            youngs_modulus: field("youngs_modulus").parse().ok(),
-            description: field("description"),
+            key: self.text("key").into(),
+            youngs_modulus: self.text("youngs_modulus").parse().ok(),
+            description: self.text("description").into(),
             path: Some(self.path.to_owned()),
         };
         let loaded = !green.loads.is_empty() || !green.free_response.is_empty();
@@ -208,21 +206,19 @@ impl<'a> Reader<'a> {
         if loaded && !(within && green.free_response.len() == green.rows) {
             return Err(self.damaged("the loads do not match the body"));
         }
-        if small_checksum(&green.small_tensors()) != field("geometry_checksum") {
+        if small_checksum(&green.small_tensors()) != self.text("geometry_checksum") {
             return Err(self.damaged("the checksum of the geometry differs"));
         }
         green.entries = match self.is_packed() {
-            true => self.packed_entries(&green, precision, &field(packed::SUM))?,
+            true => self.packed_entries(&green, precision)?,
             false => self.entries(&green, precision, resident_bytes)?,
         };
         Ok(green)
     }
 
-    fn precision(&self, metadata: &HashMap<String, String>) -> Result<Precision> {
+    fn precision(&self) -> Result<Precision> {
         if self.is_packed() {
-            let name = metadata.get("precision").map_or("", String::as_str);
-            let known = [Precision::F16, Precision::F32, Precision::F64].into_iter().find(|known| known.name() == name);
-            return known.ok_or_else(|| self.damaged("the type of its numbers"));
+            return Precision::parse(self.text("precision")).ok_or_else(|| self.damaged("the type of its numbers"));
         }
         match self.tensor("psi")?.dtype {
             Dtype::I16 => Ok(Precision::F16),
@@ -237,16 +233,17 @@ impl<'a> Reader<'a> {
     }
 
     /// What a packed store holds of the operator: rows of the surface.
-    fn packed_entries(&self, green: &GreensFunction, precision: Precision, sum: &str) -> Result<Entries> {
+    fn packed_entries(&self, green: &GreensFunction, precision: Precision) -> Result<Entries> {
+        let damaged = || Error::store(self.path, "is damaged (its packed numbers); write it again");
         let block = self.bytes(packed::BLOCK)?;
-        if blake3::hash(&block).to_hex().as_str() != sum {
-            return Err(packed::damaged(self.path));
+        if blake3::hash(&block).to_hex().as_str() != self.text(packed::SUM) {
+            return Err(damaged());
         }
         let rows = 3 * green.surface_nodes.len();
         let numbers = Numbers::try_zeros(precision, 3 * green.touch.len() * rows)?;
-        let (node_order, magnitude) = (green.entries.node_order().clone(), green.entries.magnitudes()[..rows].to_vec());
+        let (node_order, magnitude) = (green.entries.node_order.clone(), green.entries.magnitude[..rows].to_vec());
         let mut entries = Entries::new(node_order, &green.row_is_fixed[..rows], magnitude, numbers, None);
-        entries.unpack(&block).ok_or_else(|| packed::damaged(self.path))?;
+        entries.unpack(&block).ok_or_else(damaged)?;
         Ok(entries)
     }
 
@@ -256,7 +253,7 @@ impl<'a> Reader<'a> {
         if psi.shape != [columns, green.rows] {
             return Err(self.damaged("the operator's shape does not match the body"));
         }
-        let (node_order, magnitude) = (green.entries.node_order().clone(), green.entries.magnitudes().to_vec());
+        let (node_order, magnitude) = (green.entries.node_order.clone(), green.entries.magnitude.to_vec());
         let at = self.start + psi.data_offsets.0 as u64;
         let (column, head) = (green.rows * precision.bytes(), columns * precision.bytes());
         let length = columns * column;
@@ -285,10 +282,6 @@ impl<'a> Reader<'a> {
             None => Ok(()),
         }
     }
-}
-
-fn store_error(path: &Path, reason: impl Into<String>) -> Error {
-    Error::Store { path: path.to_owned(), reason: reason.into() }
 }
 
 #[cfg(all(test, feature = "offline"))]

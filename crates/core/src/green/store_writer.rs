@@ -9,9 +9,9 @@ use safetensors::tensor::Dtype;
 
 use super::checksums::{ColumnHeads, SUM, block_count, sums_keeping_heads};
 use super::function::GreensFunction;
-use super::key::FORMAT_VERSION;
+use super::key::{FORMAT_VERSION, add_sections};
 use super::precision::Precision;
-use crate::header::{seal, unsealed};
+use crate::header::Header;
 use crate::positioned::Positioned;
 use crate::{Error, Result};
 
@@ -48,7 +48,7 @@ impl StoreWriter {
             Precision::F64 => Dtype::F64,
         };
         // The operator first, where it is aligned.
-        let mut header = Header::new(green, precision);
+        let mut header = header_of(green, precision);
         header.tensor("psi", dtype, &[columns, green.rows], length);
         header.tensor("psi_checksums", Dtype::U8, &[sums, SUM], sums * SUM);
         for (name, dtype, shape, data) in &small {
@@ -107,52 +107,6 @@ impl Drop for StoreWriter {
     }
 }
 
-/// The header of a safetensors file: its length in eight bytes, then JSON, padded so that what follows is aligned.
-pub(super) struct Header {
-    fields: serde_json::Map<String, serde_json::Value>,
-    end: usize,
-}
-
-impl Header {
-    pub fn new(green: &GreensFunction, precision: Precision) -> Self {
-        let mut metadata = serde_json::json!({
-            "format": "palpate-green",
-            "version": FORMAT_VERSION.to_string(),
-            "key": green.key,
-            "precision": precision.name(),
-            "youngs_modulus": green.youngs_modulus.map_or(String::new(), |e| format!("{e:e}")),
-            "description": green.description,
-            "geometry_checksum": small_checksum(&green.small_tensors()),
-        });
-        let (name, zeros) = unsealed();
-        metadata[name] = zeros.into();
-        Self { fields: serde_json::Map::from_iter([("__metadata__".to_string(), metadata)]), end: 0 }
-    }
-
-    /// Adds a text.
-    pub fn text(&mut self, name: &str, text: &str) {
-        self.fields["__metadata__"][name] = text.into();
-    }
-
-    /// Adds a tensor behind the others.
-    pub fn tensor(&mut self, name: &str, dtype: Dtype, shape: &[usize], bytes: usize) {
-        let offsets = [self.end, self.end + bytes];
-        let tensor = serde_json::json!({"dtype": dtype.to_string(), "shape": shape, "data_offsets": offsets});
-        self.fields.insert(name.to_string(), tensor);
-        self.end += bytes;
-    }
-
-    /// The header, sealed.
-    pub fn bytes(self) -> Vec<u8> {
-        let mut json = serde_json::Value::Object(self.fields).to_string().into_bytes();
-        json.resize(json.len().next_multiple_of(8), b' ');
-        let mut head = [&(json.len() as u64).to_le_bytes()[..], &json].concat();
-        let sealed = seal(&mut head);
-        debug_assert!(sealed, "the header has a place for its sum");
-        head
-    }
-}
-
 impl GreensFunction {
     /// Writes the store beside `path` and renames it into place.
     ///
@@ -170,7 +124,7 @@ impl GreensFunction {
         let s = &self.surface;
         let (faces, face_nodes) = (s.faces.as_flattened(), s.faces.nodes_per_face());
         let fixed: Vec<u8> = self.row_is_fixed.iter().map(|&b| u8::from(b)).collect();
-        let stored = self.entries.node_order().nodes();
+        let stored = self.entries.node_order.nodes();
         let mut tensors = vec![
             ("surface_nodes", Dtype::U32, vec![self.surface_nodes.len()], bytes(&self.surface_nodes)),
             ("surface_positions", Dtype::F64, vec![s.positions.len(), 3], bytemuck::cast_slice(&s.positions).to_vec()),
@@ -186,7 +140,7 @@ impl GreensFunction {
                 tensors.push((name, Dtype::F64, vec![values.len()], bytemuck::cast_slice(values).to_vec()));
             }
         }
-        let magnitude = self.entries.magnitudes();
+        let magnitude = &self.entries.magnitude;
         let accuracy = self.accuracy.to_array();
         tensors.push(("accuracy", Dtype::F64, vec![accuracy.len()], bytemuck::cast_slice(&accuracy).to_vec()));
         tensors.insert(0, ("magnitude", Dtype::F64, vec![magnitude.len()], bytemuck::cast_slice(magnitude).to_vec()));
@@ -197,10 +151,7 @@ impl GreensFunction {
 /// One sum of all of them.
 pub fn small_checksum(tensors: &[SmallTensor]) -> String {
     let mut hash = blake3::Hasher::new();
-    for (_, _, _, bytes) in tensors {
-        hash.update(&(bytes.len() as u64).to_le_bytes());
-        hash.update(bytes);
-    }
+    add_sections(&mut hash, tensors.iter().map(|(_, _, _, bytes)| &bytes[..]));
     hash.finalize().to_hex().to_string()
 }
 
@@ -208,4 +159,17 @@ fn beside(path: &Path) -> PathBuf {
     let mut name = path.file_name().unwrap_or_default().to_os_string();
     name.push(format!(".{}.new", std::process::id()));
     path.with_file_name(name)
+}
+
+/// The header of a store without its tensors.
+pub(super) fn header_of(green: &GreensFunction, precision: Precision) -> Header {
+    Header::new([
+        ("format", "palpate-green".into()),
+        ("version", FORMAT_VERSION.to_string()),
+        ("key", green.key.clone()),
+        ("precision", precision.name().into()),
+        ("youngs_modulus", green.youngs_modulus.map_or(String::new(), |e| format!("{e:e}"))),
+        ("description", green.description.clone()),
+        ("geometry_checksum", small_checksum(&green.small_tensors())),
+    ])
 }

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
+use faer::Par;
 use faer::dyn_stack::MemBuffer;
-use faer::{MatMut, Par};
 use glam::DVec3;
 
 use super::internal::Elements;
@@ -96,7 +96,7 @@ impl HyperelasticBody {
             let dofs: &[f64] = bytemuck::cast_slice(field);
             right.extend(self.problem.supports.free.iter().map(|&dof| dofs[dof as usize]));
         }
-        self.factor.solve_in_place(MatMut::from_column_major_slice_mut(&mut right, rows, fields.len()), memory);
+        self.factor.solve_in_place(&mut right, memory);
         for (field, solution) in fields.iter_mut().zip(right.chunks_exact(rows)) {
             let dofs: &mut [f64] = bytemuck::cast_slice_mut(field);
             dofs.fill(0.0);

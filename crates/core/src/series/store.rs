@@ -57,7 +57,7 @@ impl SeriesFile {
     /// [`Error::Store`] that says what is wrong, or the operating system's error.
     pub fn read(path: &Path) -> Result<Series> {
         let mut file = KIND.read(path)?;
-        let broken = || Error::Store { path: path.to_owned(), reason: "is damaged: its arrays do not fit".into() };
+        let broken = || Error::store(path, "is damaged: its arrays do not fit");
         series_of(&mut file).ok_or_else(broken)
     }
 

@@ -12,7 +12,7 @@
 
 use glam::DMat3;
 
-use super::truncated::{DEGREE, Matrix};
+use super::truncated::{DEGREE, Matrix, Truncated};
 use crate::contact::local::StrainLaw;
 use crate::fem::Isotropic;
 
@@ -24,7 +24,7 @@ pub fn stress<const N: usize>(law: &StrainLaw, material: &Isotropic, gradients: 
     let by_order = |constant: DMat3, of: &dyn Fn(DMat3) -> DMat3| {
         std::array::from_fn(|n| if n == 0 { constant } else { gradients.get(n - 1).map_or(DMat3::ZERO, |&h| of(h)) })
     };
-    let deformation = Matrix(by_order(DMat3::IDENTITY, &|h| h));
+    let deformation = Truncated(by_order(DMat3::IDENTITY, &|h| h));
     let (lambda, mu) = material.lame();
     match *law {
         StrainLaw::Linear => {
@@ -55,7 +55,7 @@ fn neo_hookean<const N: usize>(deformation: &Matrix<N>, lambda: f64, mu: f64) ->
     let inverse = deformation.inverse();
     let log = deformation.log_determinant(&inverse);
     let against = inverse.transposed();
-    let pressed = against.scaled_by(&log).scaled(lambda);
+    let pressed = against.times(&log).scaled(lambda);
     deformation.plus(&against.scaled(-1.0)).scaled(mu).plus(&pressed).0
 }
 
@@ -73,21 +73,21 @@ fn reduced_polynomial<const N: usize>(deformation: &Matrix<N>, constants: &Polyn
     let against = inverse.transposed();
     let (cauchy_green, i1) = (deformation.transposed().times(deformation), deformation.contracted(deformation));
     let shrunk = log.scaled(-2.0 / 3.0).exponential();
-    let by_f = deformation.scaled(2.0).plus(&against.scaled_by(&i1).scaled(-2.0 / 3.0)).scaled_by(&shrunk);
+    let by_f = deformation.scaled(2.0).plus(&against.times(&i1).scaled(-2.0 / 3.0)).times(&shrunk);
     let excess = i1.times(&shrunk).shifted(-3.0);
     let quadratic = excess.times(&excess).scaled(3.0 * constants.c30);
     let slope = excess.scaled(2.0 * constants.c20).plus(&quadratic).shifted(constants.c10);
-    let mut whole = by_f.scaled_by(&slope);
+    let mut whole = by_f.times(&slope);
     if constants.c01 != 0.0 {
         let i2 = i1.times(&i1).plus(&cauchy_green.contracted(&cauchy_green).scaled(-1.0)).scaled(0.5);
-        let second = deformation.scaled_by(&i1).scaled(2.0);
+        let second = deformation.times(&i1).scaled(2.0);
         let second = second.plus(&deformation.times(&cauchy_green).scaled(-2.0));
-        let second = second.plus(&against.scaled_by(&i2).scaled(-4.0 / 3.0));
-        whole = whole.plus(&second.scaled_by(&shrunk.times(&shrunk)).scaled(constants.c01));
+        let second = second.plus(&against.times(&i2).scaled(-4.0 / 3.0));
+        whole = whole.plus(&second.times(&shrunk.times(&shrunk)).scaled(constants.c01));
     }
     let volume = log.exponential();
     let pressure = volume.shifted(-1.0).times(&volume).scaled(bulk);
-    whole.plus(&against.scaled_by(&pressure)).0
+    whole.plus(&against.times(&pressure)).0
 }
 
 #[cfg(test)]

@@ -1,21 +1,29 @@
 //! Arithmetic of power series in one variable with `N` coefficients, from order 0 on.
 
+use std::iter::Sum;
+use std::ops::{Add, Mul};
+
 use glam::DMat3;
 
 /// Degree of the deformation gradients here, which are polynomials: products with higher coefficients are left out.
 pub const DEGREE: usize = 3;
 
-/// A number.
+/// Coefficients of a series.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Scalar<const N: usize>(pub [f64; N]);
+pub struct Truncated<T, const N: usize>(pub [T; N]);
+
+/// A number.
+pub type Scalar<const N: usize> = Truncated<f64, N>;
 
 /// A matrix.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Matrix<const N: usize>(pub [DMat3; N]);
+pub type Matrix<const N: usize> = Truncated<DMat3, N>;
 
-impl<const N: usize> Scalar<N> {
+impl<T: Copy + Add<Output = T> + Mul<f64, Output = T> + Sum, const N: usize> Truncated<T, N> {
     /// Sum of products of coefficients whose orders add up to each order.
-    pub fn times(&self, other: &Self) -> Self {
+    pub fn times<U: Copy>(&self, other: &Truncated<U, N>) -> Self
+    where
+        T: Mul<U, Output = T>,
+    {
         Self(std::array::from_fn(|n| (0..=n).map(|k| self.0[k] * other.0[n - k]).sum()))
     }
 
@@ -26,7 +34,9 @@ impl<const N: usize> Scalar<N> {
     pub fn scaled(&self, factor: f64) -> Self {
         Self(self.0.map(|value| value * factor))
     }
+}
 
+impl<const N: usize> Scalar<N> {
     /// With a number added.
     pub fn shifted(mut self, by: f64) -> Self {
         self.0[0] += by;
@@ -45,29 +55,13 @@ impl<const N: usize> Scalar<N> {
 }
 
 impl<const N: usize> Matrix<N> {
-    pub fn times(&self, other: &Self) -> Self {
-        Self(std::array::from_fn(|n| (0..=n).map(|k| self.0[k] * other.0[n - k]).sum()))
-    }
-
-    pub fn scaled_by(&self, by: &Scalar<N>) -> Self {
-        Self(std::array::from_fn(|n| (0..=n).map(|k| self.0[k] * by.0[n - k]).sum()))
-    }
-
-    pub fn plus(&self, other: &Self) -> Self {
-        Self(std::array::from_fn(|n| self.0[n] + other.0[n]))
-    }
-
-    pub fn scaled(&self, factor: f64) -> Self {
-        Self(self.0.map(|value| value * factor))
-    }
-
     pub fn transposed(&self) -> Self {
         Self(self.0.map(|value| value.transpose()))
     }
 
     /// `self : other`.
     pub fn contracted(&self, other: &Self) -> Scalar<N> {
-        Scalar(std::array::from_fn(|n| (0..=n).map(|k| contraction(&self.0[k], &other.0[n - k])).sum()))
+        Truncated(std::array::from_fn(|n| (0..=n).map(|k| contraction(&self.0[k], &other.0[n - k])).sum()))
     }
 
     /// Inverse of a polynomial of degree [`DEGREE`] whose constant is the identity: `x_n = -sum a_k x_(n-k)`.
@@ -88,7 +82,7 @@ impl<const N: usize> Matrix<N> {
             let trace = |k: usize| contraction(&inverse.0[n - k].transpose(), &self.0[k]);
             *value = (1..=n.min(DEGREE)).map(|k| k as f64 * trace(k)).sum::<f64>() / n as f64;
         }
-        Scalar(l)
+        Truncated(l)
     }
 }
 

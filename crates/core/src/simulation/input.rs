@@ -2,8 +2,8 @@
 
 use glam::{DMat3, DQuat, DVec3};
 
-use super::rotation::rotation_vector;
 use super::{MAX_BODIES, MAX_TOOLS};
+use crate::tensor::rotation_vector;
 
 /// Position and orientation of a rigid tool.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

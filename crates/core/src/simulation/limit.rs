@@ -12,10 +12,11 @@
 use glam::DVec3;
 
 use super::MAX_CONTACTS;
+use super::contacts::gathered;
 use super::law::law_of;
 use super::model::Model;
 use super::scratch::Scratch;
-use super::solve::{contact_displacement, linear_slots, own_compliance, solve_with};
+use super::solve::{contact_displacement, own_compliance, solve_with};
 use super::state::{BodyState, State};
 use super::strain_projection::{StrainConstraint, Vectors, project};
 use super::strain_watch::StrainWatch;
@@ -118,8 +119,7 @@ fn share_within(state: &mut State, body: usize, limit: f64) -> (f64, bool) {
 
 /// Reduces the displacements of the contacts of a body to the strain limit; zero is no limit.
 pub(super) fn apply(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize, limit: f64) {
-    let mut slots = [0; MAX_CONTACTS];
-    let count = linear_slots(state, body, &mut slots);
+    let (slots, count) = gathered(state.contacts.linear_on(body));
     let slots = &slots[..count];
     let State { bodies, contacts, .. } = state;
     let together = count > 1 && !model.bodies[body].moves();
@@ -172,11 +172,7 @@ fn bound_displacements(model: &Model, state: &mut State, system: &mut System, sl
     let sliding = |slot: usize| contact_displacement(model, current, slot, |other| other.nonlinear);
     let (mut forces, mut short) = ([DVec3::ZERO; MAX_CONTACTS], [false; MAX_CONTACTS]);
     for _ in slots {
-        let (mut rest, mut count) = ([0; MAX_CONTACTS], 0);
-        for &slot in slots.iter().filter(|&&slot| !short[slot]) {
-            rest[count] = slot;
-            count += 1;
-        }
+        let (rest, count) = gathered(slots.iter().copied().filter(|&slot| !short[slot]));
         let rest = &rest[..count];
         solve_with(model, current, system, rest, compliance, |slot| {
             let shortened = slots.iter().filter(|&&other| short[other]);

@@ -8,7 +8,6 @@
 //! the drawn surface below a tool, `taxels` the pressures on a tool.
 
 mod body;
-mod contact_check;
 mod contacts;
 mod energy;
 mod indented;
@@ -21,7 +20,6 @@ mod model;
 mod motion;
 mod passivity;
 mod previous_ranks;
-mod rotation;
 mod scratch;
 mod series_take_up;
 mod slip;

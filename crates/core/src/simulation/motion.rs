@@ -14,7 +14,7 @@ use glam::{DMat3, DVec3};
 
 use super::MAX_CONTACTS;
 use super::body::BodyModel;
-use super::contacts::Contacts;
+use super::contacts::{Contacts, gathered};
 use super::energy::EnergyBalance;
 use super::strike::{STRIKES_AT_ONCE, StrikeInProgress, gather_rows};
 use crate::contact::{Patch, SurfacePoint};
@@ -217,14 +217,11 @@ impl Motion {
         let before = self.patches(modes, &changed, |balance, other| balance.last_force(other));
         // Initial values; only the entries written below are used.
         let mut loaded = [self.strikes[0].loaded(); MAX_CONTACTS + STRIKES_AT_ONCE];
-        let mut slots = [0; MAX_CONTACTS];
-        let mut count = 0;
-        for slot in contacts.on(body) {
-            loaded[count] = LoadedPatch::new(&self.projections[slot], contacts.slots[slot].force);
-            slots[count] = slot;
-            count += 1;
-        }
+        let (slots, count) = gathered(contacts.on(body));
         let slots = &slots[..count];
+        for (patch, &slot) in loaded.iter_mut().zip(slots) {
+            *patch = LoadedPatch::new(&self.projections[slot], contacts.slots[slot].force);
+        }
         let mut with_strikes = count;
         for strike in self.strikes.iter().filter(|strike| strike.force() != DVec3::ZERO) {
             loaded[with_strikes] = strike.loaded();

@@ -14,7 +14,7 @@
 use glam::{DQuat, DVec3};
 
 use super::MAX_CONTACTS;
-use super::rotation::rotation_vector;
+use crate::tensor::rotation_vector;
 
 /// Tolerated surplus over the largest stored energy, and the surplus to which a larger one is reduced.
 const TOLERANCE: f64 = 7e-4;

@@ -1,9 +1,8 @@
 //! The tick, in stages.
 
-use super::contact_check::is_sound;
-use super::contacts::Mode;
+use super::contacts::{Mode, gathered};
 use super::input::{Controls, Input, Output};
-use super::law::{Approach, LAWS, law_of};
+use super::law::{Approach, LAWS, is_sound, law_of};
 use super::linear_error::estimate_linear_errors;
 use super::model::Model;
 use super::scratch::Scratch;
@@ -97,12 +96,7 @@ fn follow_tools(model: &Model, state: &mut State, scratch: &mut Scratch, body: u
 
 /// Slots of a tool's contacts with a body, and their number. If none of them presses, the pending ones end.
 fn contact_slots(state: &mut State, tool: usize, body: usize) -> ([usize; MAX_CONTACTS], usize) {
-    let mut slots = [0; MAX_CONTACTS];
-    let mut count = 0;
-    for slot in state.contacts.of(tool, body) {
-        slots[count] = slot;
-        count += 1;
-    }
+    let (slots, mut count) = gathered(state.contacts.of(tool, body));
     if slots[..count].iter().all(|&slot| state.contacts.slots[slot].is_pending()) {
         slots[..count].iter().for_each(|&slot| state.contacts.clear(slot));
         count = 0;

@@ -97,15 +97,15 @@ fn add_sphere(contact: &Contact, radius: f64, grid: &TaxelGrid, pressures: &mut 
 
 fn add_cells(contact: &Contact, cells: &PressureState, grid: &TaxelGrid, pressures: &mut [f64]) {
     let Some((force, tool_from_body, _)) = seen_by_tool(contact) else { return };
-    let place = cells.place();
-    let all: f64 = cells.forces().iter().flatten().sum();
+    let PressureState { place, forces, .. } = cells;
+    let all: f64 = forces.iter().flatten().sum();
     if all.is_nan() || all <= 0.0 {
         return;
     }
     let [corner, along, across] = [place.corner, place.along, place.across].map(|vector| tool_from_body * vector);
     let scale = force / (all * grid.area() * (POINTS * POINTS) as f64);
     let within = |k: usize| (k as f64 + 0.5) / POINTS as f64;
-    for (j, row) in cells.forces().iter().enumerate().take(place.count.min(MAX_CELLS)) {
+    for (j, row) in forces.iter().enumerate().take(place.count.min(MAX_CELLS)) {
         for (i, &of_cell) in row.iter().enumerate().take(place.count).filter(|(_, force)| **force > 0.0) {
             for k in 0..POINTS * POINTS {
                 let point = corner + along * (i as f64 + within(k % POINTS)) + across * (j as f64 + within(k / POINTS));

@@ -84,7 +84,7 @@ fn largest_row_sum(stiffness: &SymmetricCsc, supports: &Supports, root: &[f64]) 
 
 #[cfg(test)]
 mod tests {
-    use faer::{MatMut, Par};
+    use faer::Par;
 
     use super::*;
     use crate::solver::Factor;
@@ -92,11 +92,7 @@ mod tests {
     fn of_factor(matrix: &SymmetricCsc, supports: &Supports) -> Condition {
         let factor = Factor::new(matrix, supports, Par::Seq).unwrap();
         let mut memory = factor.solve_scratch(1);
-        let mut solve = |x: &mut [f64]| {
-            let rows = x.len();
-            factor.solve_in_place(MatMut::from_column_major_slice_mut(x, rows, 1), &mut memory);
-        };
-        condition(&mut solve, matrix, supports)
+        condition(&mut |x| factor.solve_in_place(x, &mut memory), matrix, supports)
     }
 
     /// A chain of nodes between walls, with the same springs along each axis.

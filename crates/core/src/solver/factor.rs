@@ -120,11 +120,12 @@ impl Factor {
         self.symbolic.nrows()
     }
 
-    /// Solves `K_NN x = b` in place for the columns of `b`, sequentially.
-    pub fn solve_in_place(&self, b: MatMut<'_, f64>, memory: &mut MemBuffer) {
+    /// Solves `K_NN x = b` in place for the right-hand sides in `b`, one after the other in memory, sequentially.
+    pub fn solve_in_place(&self, b: &mut [f64], memory: &mut MemBuffer) {
+        let (rows, columns) = (self.dimension(), b.len() / self.dimension());
         LltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(
             Conj::No,
-            b,
+            MatMut::from_column_major_slice_mut(b, rows, columns),
             Par::Seq,
             MemStack::new(memory),
         );

@@ -23,6 +23,7 @@ use rayon::prelude::*;
 
 use super::block_columns::{BlockColumn, WIDTH, cuts};
 use super::buffers::{Buffers, buffer_numbers};
+use crate::{Error, Result};
 
 /// Rows that a task works on at a time: with [`WIDTH`] columns they stay in the second-level cache.
 const ROWS: usize = 512;
@@ -172,8 +173,11 @@ impl Front {
         self.size.div_ceil(WIDTH)
     }
 
-    /// Eliminates the supernode. An error is a pivot that is not positive.
-    pub fn eliminate(mut self) -> Result<(Eliminated, Update), NotPositive> {
+    /// Eliminates the supernode.
+    ///
+    /// # Errors
+    /// A pivot that is not a positive number.
+    pub fn eliminate(mut self) -> Result<(Eliminated, Update)> {
         let (pivots, shared) = (self.pivots(), self.rows >= SHARED);
         for k in 0..pivots {
             let (done, rest) = self.blocks.split_at_mut(k);
@@ -196,10 +200,6 @@ impl Front {
     }
 }
 
-/// A pivot is not a positive number.
-#[derive(Clone, Copy, Debug)]
-pub struct NotPositive;
-
 /// `F_j -= L_i L_i^T` for the finished blocks of columns `i`.
 fn subtract(done: &[BlockColumn<f64>], block: &mut BlockColumn<f64>, shared: bool) {
     let (first, width) = (block.first, block.width);
@@ -216,19 +216,23 @@ fn subtract(done: &[BlockColumn<f64>], block: &mut BlockColumn<f64>, shared: boo
 }
 
 /// `L_kk`, then `L_bk`, of one block of columns.
-fn factorise(block: &mut BlockColumn<f64>, shared: bool) -> Result<(), NotPositive> {
+fn factorise(block: &mut BlockColumn<f64>, shared: bool) -> Result<()> {
     let width = block.width;
     let mut memory = MemBuffer::new(cholesky_in_place_scratch::<f64>(width, Par::Seq, Default::default()));
     let (mut top, below) = block.matrix_mut().split_at_row_mut(width);
     let regular = LltRegularization::default();
     cholesky_in_place(top.as_mut(), regular, Par::Seq, MemStack::new(&mut memory), Default::default())
-        .map_err(|_| NotPositive)?;
+        .map_err(|_| not_positive())?;
     if !(0..width).all(|k| top[(k, k)].is_finite()) {
-        return Err(NotPositive);
+        return Err(not_positive());
     }
     let top = top.as_ref();
     in_row_chunks(below, shared, &|_, rows| solve_lower_triangular_in_place(top, rows.transpose_mut(), Par::Seq));
     Ok(())
+}
+
+fn not_positive() -> Error {
+    Error::Singular("a pivot is not positive; is every part of the body held by a support?".into())
 }
 
 /// Calls `work` with the first row and the rows of every chunk.

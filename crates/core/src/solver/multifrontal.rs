@@ -14,7 +14,7 @@ use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 use rayon::prelude::*;
 
 use super::buffers::Buffers;
-use super::front::{Eliminated, Front, Update, UpdateMatrix, front_numbers};
+use super::front::{ColumnEntries, Eliminated, Front, Update, UpdateMatrix, front_numbers};
 use crate::{Error, Result};
 
 /// A subtree of less than this part of all operations is shared by the threads, one of less than a sixteenth of that is
@@ -41,12 +41,6 @@ struct Unit {
     groups: Vec<Vec<u32>>,
     /// Those above them, children before parents, each shared by the threads.
     rest: Vec<u32>,
-}
-
-/// Where the columns of the matrix come from: for a position, its entries on and below the diagonal.
-pub trait Columns: Sync {
-    /// Calls `see(position of the row, value)` for each of them.
-    fn each(&self, position: usize, see: &mut dyn FnMut(usize, f64));
 }
 
 impl Schedule {
@@ -126,17 +120,18 @@ impl Schedule {
         (0..self.parents.len()).map(|s| numbers(structure, s).0).max().unwrap_or(0)
     }
 
-    /// Eliminates everything; `keep` is handed the columns of each supernode, `interrupt` asked now and then.
+    /// Eliminates everything; `columns` has the entries on and below the diagonal by position, `keep` is handed the columns of
+    /// each supernode, `interrupt` asked now and then.
     ///
     /// # Errors
     /// A pivot that is not positive, or that of `interrupt`.
-    pub fn run<PreviousRanks: Send>(
+    pub fn run<Kept: Send>(
         &self,
         structure: &SymbolicSupernodalCholesky<usize>,
-        columns: &dyn Columns,
-        keep: &(dyn Fn(&Eliminated) -> PreviousRanks + Sync),
+        columns: ColumnEntries<'_>,
+        keep: &(dyn Fn(&Eliminated) -> Kept + Sync),
         interrupt: &(dyn Fn() -> Result<()> + Sync),
-    ) -> Result<Vec<PreviousRanks>> {
+    ) -> Result<Vec<Kept>> {
         let run = Run {
             schedule: self,
             structure,
@@ -163,21 +158,21 @@ impl Schedule {
 }
 
 /// What a factorisation works on.
-struct Run<'a, PreviousRanks> {
+struct Run<'a, Kept> {
     schedule: &'a Schedule,
     structure: &'a SymbolicSupernodalCholesky<usize>,
-    columns: &'a dyn Columns,
+    columns: ColumnEntries<'a>,
     buffers: Buffers,
     updates: Vec<Mutex<Option<Update>>>,
-    results: Vec<Mutex<Option<PreviousRanks>>>,
-    keep: &'a (dyn Fn(&Eliminated) -> PreviousRanks + Sync),
+    results: Vec<Mutex<Option<Kept>>>,
+    keep: &'a (dyn Fn(&Eliminated) -> Kept + Sync),
 }
 
-impl<PreviousRanks> Run<'_, PreviousRanks> {
+impl<Kept> Run<'_, Kept> {
     /// Eliminates some supernodes in their order; `places` has room for every position.
     fn eliminate(&self, supernodes: &[u32], places: &mut [u32]) -> Result<()> {
         for s in supernodes.iter().map(|&s| s as usize) {
-            let (eliminated, update) = self.front(s, places).eliminate().map_err(|_| not_positive())?;
+            let (eliminated, update) = self.front(s, places).eliminate()?;
             if self.schedule.parents[s] != NONE {
                 put(&self.updates[s], update);
             }
@@ -202,7 +197,7 @@ impl<PreviousRanks> Run<'_, PreviousRanks> {
         };
         let children = self.schedule.children[s].iter().filter_map(addend).collect();
         let own = |column: usize, see: &mut dyn FnMut(usize, f64)| {
-            self.columns.each(positions.start + column, &mut |row, value| see(places[row] as usize, value));
+            (self.columns)(positions.start + column, &mut |row, value| see(places[row] as usize, value));
         };
         Front::new(positions.len(), boundary.len(), &own, children, &self.buffers)
     }
@@ -216,10 +211,6 @@ fn put<T>(slot: &Mutex<Option<T>>, value: T) {
 
 fn take<T>(slot: &Mutex<Option<T>>) -> Option<T> {
     slot.lock().ok().and_then(|mut slot| slot.take())
-}
-
-fn not_positive() -> Error {
-    Error::Singular("a pivot is not positive; is every part of the body held by a support?".into())
 }
 
 /// Memory as it is taken and given back, bytes.
@@ -250,8 +241,14 @@ impl MemoryCount<'_> {
 
 /// Numbers of the front of a supernode, and of its update.
 fn numbers(structure: &SymbolicSupernodalCholesky<usize>, s: usize) -> (usize, usize) {
+    let (size, boundary) = sizes(structure, s);
+    front_numbers(size, boundary)
+}
+
+/// Number of a supernode's columns, and of the rows of its boundary.
+pub fn sizes(structure: &SymbolicSupernodalCholesky<usize>, s: usize) -> (usize, usize) {
     let size = structure.supernode_end()[s] - structure.supernode_begin()[s];
-    front_numbers(size, structure.supernode(s).pattern().len())
+    (size, structure.supernode(s).pattern().len())
 }
 
 /// The supernode of each one's first boundary row.
@@ -263,7 +260,6 @@ fn parents(structure: &SymbolicSupernodalCholesky<usize>) -> Vec<u32> {
 
 /// Operations of a supernode's elimination: a column with `c` numbers below its diagonal takes `(c + 1)^2`.
 pub fn operations(structure: &SymbolicSupernodalCholesky<usize>, s: usize) -> f64 {
-    let size = structure.supernode_end()[s] - structure.supernode_begin()[s];
-    let below = structure.supernode(s).pattern().len();
+    let (size, below) = sizes(structure, s);
     (1..=size).map(|k| ((below + k) as f64).powi(2)).sum()
 }

@@ -11,17 +11,9 @@ const DIRECTIONS: usize = 200;
 /// Forces on the patches of up to four contacts, of components up to one.
 pub type Loading = [DVec3; MAX_CONTACTS_WATCHED];
 
-/// What strain is sampled under.
-pub struct Loadings {
-    /// Each contact alone first, then combinations.
-    pub directions: Vec<Loading>,
-    /// Whether a loading turned round strains differently, so that it counts as another one.
-    pub both_signs: bool,
-}
-
 /// Directions of each contact alone, evenly on half a sphere (Fibonacci's lattice), then combinations: the points of a
 /// Kronecker sequence (powers of the root of `x^(d+1) = x + 1`; Roberts, 2018), which fill the cube evenly.
-pub fn loadings(contacts: usize, both_signs: bool) -> Loadings {
+pub fn loadings(contacts: usize) -> Vec<Loading> {
     let mut directions = Vec::new();
     let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
     for contact in 0..contacts {
@@ -45,5 +37,5 @@ pub fn loadings(contacts: usize, both_signs: bool) -> Loadings {
             std::array::from_fn(|c| if c < contacts { vector(c) } else { DVec3::ZERO })
         }));
     }
-    Loadings { directions, both_signs }
+    directions
 }

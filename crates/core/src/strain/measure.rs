@@ -5,12 +5,12 @@ use std::sync::Arc;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::loading::{Loadings, loadings};
+use super::loading::loadings;
 use super::response::{MAX_CONTACTS_WATCHED, Place, StrainResponse};
 use super::watched_points::choose;
 use super::{GradientOperator, StrainKind};
 use crate::element::{Face, Tri3, Tri6};
-use crate::green::{GreensFunction, Interior, TouchNode};
+use crate::green::{Extension, GreensFunction, TouchNode};
 use crate::mesh::{Faces, Surface};
 use crate::{Error, Result};
 
@@ -33,7 +33,7 @@ pub struct StrainMeasure {
     kind: StrainKind,
     gradients: GradientOperator,
     /// By the elements: what extends displacements of the surface to all nodes.
-    interior: Option<Arc<Interior>>,
+    interior: Option<Arc<dyn Extension>>,
     /// By the surface alone: rest positions, of which the gradient is taken too. Empty otherwise.
     positions: Vec<[f64; 3]>,
     surface_count: usize,
@@ -44,12 +44,12 @@ impl StrainMeasure {
     ///
     /// # Errors
     /// An operator that is not the symmetric part of a gradient, or names nodes that the body does not have.
-    pub fn of_elements(operator: StrainOperator<'_>, interior: Arc<Interior>) -> Result<Self> {
+    pub fn of_elements(operator: StrainOperator<'_>, interior: Arc<dyn Extension>) -> Result<Self> {
         Ok(Self::of_gradients(gradients_of(operator, interior.dof_count() / 3)?, interior))
     }
 
     /// The infinitesimal strain of displacement gradients, as [`StrainMeasure::gradients`] has them.
-    pub fn of_gradients(gradients: GradientOperator, interior: Arc<Interior>) -> Self {
+    pub fn of_gradients(gradients: GradientOperator, interior: Arc<dyn Extension>) -> Self {
         let surface_count = interior.surface_count();
         let kind = StrainKind::Infinitesimal;
         Self { kind, gradients, interior: Some(interior), positions: Vec::new(), surface_count }
@@ -88,8 +88,9 @@ impl StrainMeasure {
             return Err(Error::Invalid(format!("the limit of strain must be positive, got {limit}")));
         }
         let loaded = green.free_response.iter().any(|&u| u != 0.0);
-        let Loadings { directions, both_signs } = loadings(patches.len(), loaded || self.kind == StrainKind::InPlane);
-        let chosen = choose(self.kind, patches.len(), &places, &directions, both_signs, limit);
+        // Then a loading turned round strains differently, and counts as another one.
+        let both_signs = loaded || self.kind == StrainKind::InPlane;
+        let chosen = choose(self.kind, patches.len(), &places, &loadings(patches.len()), both_signs, limit);
         Ok(StrainResponse::new(self.kind, patches.len(), &chosen))
     }
 

@@ -83,11 +83,6 @@ impl Tip {
         self
     }
 
-    /// What it is made of.
-    pub fn mechanics(&self) -> &Mechanics {
-        &self.mechanics
-    }
-
     /// Time since it was made, s.
     pub fn time(&self) -> f64 {
         self.time

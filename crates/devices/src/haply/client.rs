@@ -72,7 +72,8 @@ pub struct Client {
     pub published: PublishedReading,
     to_loop: Input<PublishedReading>,
     from_loop: Latest<ForceRequest>,
-    stop: Arc<AtomicBool>,
+    /// The flag that stops it.
+    pub stop: Arc<AtomicBool>,
     /// When the next message is due.
     due: Instant,
     period: Duration,
@@ -111,11 +112,6 @@ impl Client {
             from_loop,
             period,
         }
-    }
-
-    /// The flag that stops it.
-    pub fn stop_flag(&self) -> Arc<AtomicBool> {
-        self.stop.clone()
     }
 
     /// Runs until it is stopped.

@@ -60,7 +60,7 @@ pub fn open(connection: &Connection) -> Result<ReadyDevice, OpenError> {
     let (to_thread, from_loop) = triple_buffer(&ForceRequest::default());
     let mut client = Client::new(service, socket, (arm, &snapshot), clock, (to_loop, from_loop));
     let delay = measure_delay(&mut client, &name)? + 1.0 / rate;
-    let stop = client.stop_flag();
+    let stop = client.stop.clone();
     let thread = thread::Builder::new().name("haply".into()).spawn(move || client.run()).map_err(|error| {
         OpenError::new(format!("the system gives no thread for the {name} ({error})"), "close other programs")
     })?;

@@ -22,12 +22,8 @@ pub fn file_of(folder: &Path, name: &str) -> Result<PathBuf> {
     if plain {
         Ok(folder.join(name))
     } else {
-        Err(refused(folder, format!("names the file '{name}' outside of itself")))
+        Err(Error::store(folder, format!("names the file '{name}' outside of itself")))
     }
-}
-
-pub fn refused(path: &Path, reason: impl Into<String>) -> Error {
-    Error::Store { path: path.to_owned(), reason: reason.into() }
 }
 
 /// The bytes of a file, verified.
@@ -45,7 +41,10 @@ impl Arrays {
         let path = file_of(folder, &file.file)?;
         let bytes = files::read(&path).map_err(|source| Error::Io { path: path.clone(), source })?;
         if checksum(&bytes) != file.checksum {
-            return Err(refused(&path, "is damaged, or of another scene: its checksum differs; pack the scene again"));
+            return Err(Error::store(
+                &path,
+                "is damaged, or of another scene: its checksum differs; pack the scene again",
+            ));
         }
         Ok(Self { path, bytes })
     }
@@ -55,7 +54,7 @@ impl Arrays {
     /// # Errors
     /// Another type or width.
     pub fn optional<T: AnyBitPattern>(&self, name: &str, dtype: Dtype, columns: usize) -> Result<Option<Vec<T>>> {
-        let wrong = |what: &str| refused(&self.path, format!("{what} ('{name}'); pack the scene again"));
+        let wrong = |what: &str| Error::store(&self.path, format!("{what} ('{name}'); pack the scene again"));
         let tensors = SafeTensors::deserialize(&self.bytes).map_err(|_| wrong("is no file of arrays"))?;
         let Ok(tensor) = tensors.tensor(name) else { return Ok(None) };
         let width: usize = tensor.shape().iter().skip(1).product();
@@ -71,7 +70,7 @@ impl Arrays {
     /// # Errors
     /// No such array.
     pub fn numbers<T: AnyBitPattern>(&self, name: &str, dtype: Dtype, columns: usize) -> Result<Vec<T>> {
-        let missing = || refused(&self.path, format!("has no array '{name}'; pack the scene again"));
+        let missing = || Error::store(&self.path, format!("has no array '{name}'; pack the scene again"));
         self.optional(name, dtype, columns)?.ok_or_else(missing)
     }
 
@@ -81,7 +80,7 @@ impl Arrays {
     /// No such array.
     #[cfg(feature = "offline")]
     pub fn width(&self, name: &str) -> Result<usize> {
-        let missing = |_| refused(&self.path, format!("has no array '{name}'; pack the scene again"));
+        let missing = |_| Error::store(&self.path, format!("has no array '{name}'; pack the scene again"));
         let tensors = SafeTensors::deserialize(&self.bytes).map_err(missing)?;
         Ok(tensors.tensor(name).map_err(missing)?.shape().iter().skip(1).product())
     }

@@ -17,7 +17,7 @@ use palpate_devices::DeviceLimits;
 use palpate_servo::{SafetyLimits, Scheduling};
 use safetensors::tensor::Dtype;
 
-use super::arrays::{Arrays, file_of, refused};
+use super::arrays::{Arrays, file_of};
 use super::description::{
     BodyDescription, MotionDescription, SceneDescription, Scheme, ShapeDescription, ToolDescription,
 };
@@ -61,14 +61,14 @@ pub fn read(folder: &Path) -> Result<Scene> {
 
 /// Checks format and version before anything else: the keys of another version may be others.
 fn describe(path: &Path, text: &str) -> Result<SceneDescription> {
-    let foreign = |error: serde_json::Error| refused(path, format!("is not a packed scene: {error}"));
+    let foreign = |error: serde_json::Error| Error::store(path, format!("is not a packed scene: {error}"));
     let value: serde_json::Value = serde_json::from_str(text).map_err(foreign)?;
     if value["format"] != FORMAT {
-        return Err(refused(path, "is not a packed scene: write one by 'palpate pack'"));
+        return Err(Error::store(path, "is not a packed scene: write one by 'palpate pack'"));
     }
     if value["version"] != VERSION {
         let version = &value["version"];
-        return Err(refused(
+        return Err(Error::store(
             path,
             format!("has version {version}, this program reads {VERSION}; pack the scene again"),
         ));
@@ -135,7 +135,7 @@ fn strain(_arrays: &Arrays, green: &GreensFunction) -> Result<StrainMeasure> {
 /// Text of a file.
 fn read_text(path: &Path) -> Result<String> {
     let io = |source| Error::Io { path: path.to_owned(), source };
-    String::from_utf8(files::read(path).map_err(io)?).map_err(|_| refused(path, "is no text"))
+    String::from_utf8(files::read(path).map_err(io)?).map_err(|_| Error::store(path, "is no text"))
 }
 
 /// Reads one tool as `scene.json` describes it; its shape is not that of a file.

@@ -17,6 +17,7 @@
 use glam::{DMat3, DVec3};
 use pulp::{Arch, NullaryFnOnce};
 
+use crate::math::sum_lanes;
 use crate::tensor::{across, symmetric};
 
 /// Springs with sliders.
@@ -71,7 +72,7 @@ impl Friction {
 
     /// Force of all springs on the body, N.
     pub fn force(&self) -> DVec3 {
-        DVec3::from_array(self.springs.map(total))
+        DVec3::from_array(self.springs.map(sum_lanes))
     }
 
     /// The springs after a `displacement` of the tool along the surface (m; its part along the normal does not
@@ -96,8 +97,8 @@ impl Friction {
         response.force = response.friction.force();
         // The force of a slipping slider turns with the displacement and keeps the length of its bound.
         response.by_displacement =
-            (across(normal) * total(forces.shares) - symmetric(forces.turning.map(total))) * spring;
-        response.by_pressing = DVec3::from_array(forces.directions.map(total)) * coefficient;
+            (across(normal) * sum_lanes(forces.shares) - symmetric(forces.turning.map(sum_lanes))) * spring;
+        response.by_pressing = DVec3::from_array(forces.directions.map(sum_lanes)) * coefficient;
         response.slipping = forces.slipping.iter().all(|&slips| slips > 0.0);
         let work = 0.5 * (self.force() + response.force).dot(along);
         response.dissipated = work + self.energy() - response.friction.energy();
@@ -172,11 +173,6 @@ impl NullaryFnOnce for Sliders<'_> {
         }
         forces
     }
-}
-
-/// Sum over the springs.
-fn total([a, b, c, d, e, f, g, h]: Springs) -> f64 {
-    ((a + e) + (c + g)) + ((b + f) + (d + h))
 }
 
 #[cfg(test)]

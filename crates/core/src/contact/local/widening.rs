@@ -60,13 +60,9 @@ impl Widening {
     ) -> WidenedContact {
         let indent = |approach: f64| {
             let sphere = indent_sphere(approach, pair, effective_modulus);
-            match terms {
-                Some(terms) => {
-                    let correction = correct_sphere(approach, pair.radius, effective_modulus, terms);
-                    (sphere.corrected(&correction), correction)
-                }
-                None => (sphere, StrainCorrection::default()),
-            }
+            let Some(terms) = terms else { return (sphere, StrainCorrection::default()) };
+            let correction = correct_sphere(approach, pair.radius, effective_modulus, terms);
+            (sphere.corrected(&correction), correction)
         };
         let whole = approach.max(0.0);
         let mut own = whole;

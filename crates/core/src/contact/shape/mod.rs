@@ -176,7 +176,7 @@ impl ToolShape {
             Self::Sphere { .. } | Self::Ellipsoid { .. } => DVec3::ZERO,
             Self::Capsule { half_length, .. } => DVec3::Z * half_length,
             Self::Punch { radius, .. } => DVec3::Z * (0.5 * punch::LENGTH * radius),
-            Self::Surface(ref surface) => surface.centre(),
+            Self::Surface(ref surface) => surface.centre,
         }
     }
 
@@ -192,7 +192,7 @@ impl ToolShape {
             Self::Ellipsoid { semi_axes } => semi_axes.max_element(),
             Self::Capsule { radius, half_length } => radius + half_length,
             Self::Punch { radius, .. } => radius * hypot(0.5 * punch::LENGTH, 1.0),
-            Self::Surface(ref surface) => surface.bounding_radius(),
+            Self::Surface(ref surface) => surface.bounding_radius,
         }
     }
 
@@ -235,7 +235,7 @@ impl ToolShape {
                 let parts = semi_axes / semi_axes.max_element();
                 DMat3::from_diagonal(parts * parts)
             }
-            Self::Surface(ref surface) => along(surface.long_axis()),
+            Self::Surface(ref surface) => along(surface.long_axis),
         }
     }
 }

@@ -45,9 +45,11 @@ pub struct SurfaceShape {
     extreme_points: Vec<DVec3>,
     /// No point of the surface lies farther outside of their hull, m.
     hull_margin: f64,
-    centre: DVec3,
-    bounding_radius: f64,
-    long_axis: DVec3,
+    /// Middle of its bounding box, and distance of the farthest vertex from there, m.
+    pub(super) centre: DVec3,
+    pub(super) bounding_radius: f64,
+    /// Principal axis of the largest moment of the surface.
+    pub(super) long_axis: DVec3,
 }
 
 impl std::fmt::Debug for SurfaceShape {
@@ -170,21 +172,6 @@ impl SurfaceShape {
             distance += newton.abs().min(2.0 * self.spacing).max(value.abs()).copysign(value);
         }
         None
-    }
-
-    /// Middle of its bounding box.
-    pub(super) fn centre(&self) -> DVec3 {
-        self.centre
-    }
-
-    /// Distance of the farthest vertex from the centre.
-    pub(super) fn bounding_radius(&self) -> f64 {
-        self.bounding_radius
-    }
-
-    /// Principal axis of the largest moment of the surface.
-    pub(super) fn long_axis(&self) -> DVec3 {
-        self.long_axis
     }
 }
 

@@ -4,6 +4,8 @@
 //! A kernel is a struct with `call` inlined into a function compiled for the processor's vectors (`pulp`); a closure in
 //! its place may be left outside and run on the narrowest ones.
 
+use crate::math::sum_lanes;
+
 /// Modes a group.
 pub const LANES: usize = 8;
 
@@ -58,8 +60,7 @@ impl Lanes {
     /// Sum of the lanes.
     #[inline(always)]
     pub fn sum(self) -> f64 {
-        let [a, b, c, d, e, f, g, h] = self.0;
-        ((a + e) + (c + g)) + ((b + f) + (d + h))
+        sum_lanes(self.0)
     }
 }
 

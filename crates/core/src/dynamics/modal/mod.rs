@@ -9,6 +9,6 @@ mod projection;
 
 pub use account::EnergyAccount;
 pub use lanes::{LANES, Lanes};
-pub use model::{ModalModel, ModalScratch, ModalState};
+pub use model::{ModalModel, ModalState};
 pub use predicted::{LoadedPatch, PredictedState, StepEnergy};
 pub use projection::Projection;

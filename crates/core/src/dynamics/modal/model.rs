@@ -1,4 +1,4 @@
-//! Motion by modes: `ModalModel` is fixed, `ModalState` evolves, `ModalScratch` is reusable memory. Nothing here allocates in a step.
+//! Motion by modes: `ModalModel` is fixed, `ModalState` evolves. Nothing here allocates in a step.
 //!
 //! `u = Phi q` with `Phi^T M Phi = I` and `Phi^T K Phi = diag(k)`. A step is `predict`, the motion under no new force,
 //! then `correct` by the modal force `p = Phi^T F` at the step's end. Between both a contact may ask for the free motion
@@ -48,13 +48,6 @@ pub struct ModalState {
     pub load: Vec<Lanes>,
     /// Steps made.
     pub steps: u64,
-}
-
-/// Memory of a step.
-#[derive(Clone, Debug)]
-pub struct ModalScratch {
-    /// Modal force under construction, N/sqrt(kg).
-    pub load: Vec<Lanes>,
 }
 
 impl ModalModel {
@@ -131,9 +124,9 @@ impl ModalModel {
         Ok(ModalState { q: grouped(q), v: grouped(v), load: vec![Lanes::default(); self.groups], steps: 0 })
     }
 
-    /// Memory for a step.
-    pub fn scratch(&self) -> ModalScratch {
-        ModalScratch { load: vec![Lanes::default(); self.groups] }
+    /// Memory for the modal force of a step, N/sqrt(kg).
+    pub fn scratch(&self) -> Vec<Lanes> {
+        vec![Lanes::default(); self.groups]
     }
 
     /// Shapes at a row.
@@ -142,13 +135,13 @@ impl ModalModel {
     }
 
     /// Advances by one step under forces `(row, N)` at the step's end; rows that do not exist are left out.
-    pub fn step(&self, state: &mut ModalState, scratch: &mut ModalScratch, forces: &[(u32, f64)]) {
+    pub fn step(&self, state: &mut ModalState, load: &mut [Lanes], forces: &[(u32, f64)]) {
         self.predict(state);
-        scratch.load.fill(Lanes::default());
+        load.fill(Lanes::default());
         for &(row, force) in forces {
-            self.add_force(row, force, &mut scratch.load);
+            self.add_force(row, force, load);
         }
-        self.correct(state, &scratch.load);
+        self.correct(state, load);
     }
 
     /// Modal force of a force at a row: `load += Phi_row^T force`.
@@ -160,16 +153,12 @@ impl ModalModel {
 
     /// Adds to the displacements at a step's end what a modal force there does: `q += diag(q_load) load`.
     pub fn add_step(&self, load: &[Lanes], q: &mut [Lanes]) {
-        for ((q, p), q_load) in q.iter_mut().zip(load).zip(&self.q_load) {
-            *q = q.plus(p, q_load);
-        }
+        add_products(load, &self.q_load, q);
     }
 
     /// Adds what a modal force does to the elastic modes at rest: `q += diag(1/k) load`.
     pub fn add_static(&self, load: &[Lanes], q: &mut [Lanes]) {
-        for ((q, p), flexibility) in q.iter_mut().zip(load).zip(&self.flexibility) {
-            *q = q.plus(p, flexibility);
-        }
+        add_products(load, &self.flexibility, q);
     }
 
     /// The step without a new force: afterwards `q`, `v` are the free motion at the step's end.
@@ -204,5 +193,11 @@ impl ModalModel {
                 Lanes(std::array::from_fn(of))
             })
             .collect()
+    }
+}
+
+fn add_products(load: &[Lanes], factors: &[Lanes], q: &mut [Lanes]) {
+    for ((q, p), factor) in q.iter_mut().zip(load).zip(factors) {
+        *q = q.plus(p, factor);
     }
 }

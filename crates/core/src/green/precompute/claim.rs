@@ -12,9 +12,11 @@ use crate::{Error, Result};
 
 /// The right to write a store, until it is released or dropped.
 pub struct Claim {
-    target: PathBuf,
-    path: PathBuf,
-    file: File,
+    /// The store.
+    pub(super) target: PathBuf,
+    /// The file of panels.
+    pub(super) path: PathBuf,
+    pub(super) file: File,
     released: AtomicBool,
 }
 
@@ -43,21 +45,6 @@ impl Claim {
                 return Ok(Some(claim));
             }
         }
-    }
-
-    /// The store.
-    pub fn target(&self) -> &Path {
-        &self.target
-    }
-
-    /// The file of panels.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
-    /// The open file.
-    pub fn file(&self) -> &File {
-        &self.file
     }
 
     /// Removes the file of panels.

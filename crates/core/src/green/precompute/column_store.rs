@@ -8,18 +8,17 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::arrangement::Arrangement;
-use super::block::Block;
 use super::claim::Claim;
 use super::columns::{AssembledProblem, Measurement};
 use super::factorization::RequestedPrecision;
-use super::finish::FinishedPanels;
-use super::layout::{Layout, Stage};
+use super::layout::{Block, Layout, Stage};
+use super::mirror::Mirror;
 use super::number::Number;
 use super::panels::Panels;
 use super::partial::Partial;
-use super::phase::PhaseCallback;
 use super::problem::{Problem, TouchKey};
-use super::tasks::{Progress, task_failed};
+use super::scales::magnitudes;
+use super::tasks::{PhaseCallback, Progress, task_failed};
 use crate::green::entries::Entries;
 use crate::green::function::GreensFunction;
 use crate::green::key::FORMAT_VERSION;
@@ -53,8 +52,10 @@ pub struct PreviousWork {
 /// A store under construction.
 pub struct ColumnStore {
     path: PathBuf,
-    parts: Arc<AssembledProblem>,
-    blocks: Vec<Block>,
+    /// Rows and columns in their order.
+    pub parts: Arc<AssembledProblem>,
+    /// The blocks.
+    pub blocks: Vec<Block>,
     /// Columns of a block.
     width: usize,
     partial: Arc<Partial>,
@@ -87,11 +88,8 @@ impl ColumnStore {
         measurement: &Measurement,
         target: &Target<'_>,
     ) -> Result<Self> {
-        let mut store = Self::begin(claim, problem, parts, measurement, target)?;
-        let parts = Arc::clone(&store.parts);
-        store.arrange(parts)?;
-        store.previous.resumed = store.done();
-        Ok(store)
+        let store = Self::begin(claim, problem, Arc::clone(&parts), measurement, target)?;
+        store.resumed(parts)
     }
 
     /// Begins a store whose columns are in stages of nodes, or resumes an interrupted computation of the same one: first in its
@@ -108,7 +106,7 @@ impl ColumnStore {
         target: &Target<'_>,
     ) -> Result<Self> {
         let with_stages = Arc::new(parts.with_stages(0, stages));
-        let mut store = Self::begin(claim, problem, with_stages, measurement, target)?;
+        let store = Self::begin(claim, problem, with_stages, measurement, target)?;
         let begun = store.partial.begun();
         let layout = &store.parts.layout;
         let row = |place: usize| layout.row(place) as u32;
@@ -122,9 +120,14 @@ impl ColumnStore {
             let prefix = begun.iter().map(Vec::len).sum();
             Arc::new(store.parts.with_blocks_first(&begun).with_stages(prefix, stages))
         };
-        store.arrange(parts)?;
-        store.previous.resumed = store.done();
-        Ok(store)
+        store.resumed(parts)
+    }
+
+    /// Takes up what is finished of the columns in this order.
+    fn resumed(mut self, parts: Arc<AssembledProblem>) -> Result<Self> {
+        self.arrange(parts)?;
+        self.previous.resumed = self.done();
+        Ok(self)
     }
 
     /// Opens the partial file, without any blocks.
@@ -142,7 +145,7 @@ impl ColumnStore {
             "{{\"format\":\"palpate-partial\",\"version\":{FORMAT_VERSION},\"key\":\"{}\",\"bytes\":{kind},\"width\":{width}}}\n",
             green.key
         );
-        let path = claim.target().to_owned();
+        let path = claim.target.clone();
         let (partial, discarded) = Partial::open(claim, &header, &parts.layout, kind)?;
         let key = problem.key_of_touch(target.precision.named());
         let previous = PreviousWork { resumed: 0, discarded };
@@ -160,16 +163,6 @@ impl ColumnStore {
         partial.arrange(&self.parts.layout, &self.blocks)
     }
 
-    /// Rows and columns in their order.
-    pub fn parts(&self) -> &Arc<AssembledProblem> {
-        &self.parts
-    }
-
-    /// The blocks.
-    pub fn blocks(&self) -> &[Block] {
-        &self.blocks
-    }
-
     /// Numbers of the missing blocks.
     pub fn missing(&self) -> Vec<usize> {
         (0..self.blocks.len()).filter(|&k| !self.partial.has(k)).collect()
@@ -179,7 +172,7 @@ impl ColumnStore {
     pub fn first_unfinished(&self) -> Option<UnfinishedStage> {
         let missing = self.missing();
         let stage = self.parts.layout.stage_of(self.blocks[*missing.first()?].first);
-        let Stage { supports, forces } = self.parts.layout.stages()[stage].clone();
+        let Stage { supports, forces } = self.parts.layout.stages[stage].clone();
         let blocks = missing.into_iter().take_while(|&block| self.blocks[block].first < forces.end).collect();
         Some(UnfinishedStage { first: supports.start, end: forces.end, blocks })
     }
@@ -273,14 +266,13 @@ impl ColumnStore {
         }
         let (precision, done, all) = (self.green.precision(), self.done(), self.columns());
         let panels = Panels::<T>::File(Arc::clone(&self.partial));
-        let finished =
-            FinishedPanels { parts: &self.parts, arrangement, blocks: &self.blocks[..count], panels: &panels, tasks };
-        let magnitude = finished.magnitudes()?;
+        let mirror = Mirror { parts: &self.parts, arrangement, blocks: &self.blocks[..count], panels: &panels, tasks };
+        let magnitude = magnitudes(&mirror)?;
         self.green.touch.clone_from(&arrangement.touch);
         self.green.key = self.key.of(&arrangement.touch);
         self.green.entries = without_numbers(arrangement, &self.green.row_is_fixed, magnitude.clone(), precision);
         let writer = StoreWriter::create(&self.path, &self.green)?;
-        finished.columns(precision, &magnitude, &|column, bytes| {
+        mirror.columns(precision, &magnitude, &|column, bytes| {
             if !progress(done, all) {
                 return Err(Error::Interrupted);
             }

@@ -5,15 +5,13 @@
 
 use std::sync::Arc;
 
-use super::block::Block;
 use super::factorization::{Factorization, RequestedPrecision, Sweeps, factorize};
-use super::layout::Layout;
-use super::phase::PhaseCallback;
+use super::layout::{Block, Layout};
 use super::plan::SymbolicAnalysis;
 use super::problem::Problem;
 use super::sweep::Scratch;
 use super::system::System;
-use super::tasks::task_failed;
+use super::tasks::{PhaseCallback, task_failed};
 use super::tree::Reading;
 use crate::Result;
 use crate::fem::{Supports, SymmetricCsc};
@@ -154,20 +152,11 @@ impl Columns {
     pub fn solve<'w>(&self, block: &Block, working: &'w mut TaskMemory) -> Result<&'w [u8]> {
         let AssembledProblem { stiffness, supports, layout } = self.parts.as_ref();
         let system = System { stiffness, supports, layout };
-        match (&self.sweeps, working) {
-            (Sweeps::Single(sweep), TaskMemory::Single(scratch, panel)) => {
-                system.solve(sweep, block, scratch, panel);
-                Ok(bytemuck::cast_slice(panel))
-            }
-            (Sweeps::Double(sweep), TaskMemory::Mixed(scratch, panel)) => {
-                system.solve(sweep, block, scratch, panel);
-                Ok(bytemuck::cast_slice(panel))
-            }
-            (Sweeps::Double(sweep), TaskMemory::Double(scratch, panel)) => {
-                system.solve(sweep, block, scratch, panel);
-                Ok(bytemuck::cast_slice(panel))
-            }
-            _ => Err(task_failed()),
-        }
+        Ok(match (&self.sweeps, working) {
+            (Sweeps::Single(sweep), TaskMemory::Single(scratch, panel)) => system.solve(sweep, block, scratch, panel),
+            (Sweeps::Double(sweep), TaskMemory::Mixed(scratch, panel)) => system.solve(sweep, block, scratch, panel),
+            (Sweeps::Double(sweep), TaskMemory::Double(scratch, panel)) => system.solve(sweep, block, scratch, panel),
+            _ => return Err(task_failed()),
+        })
     }
 }

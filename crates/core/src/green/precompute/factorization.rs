@@ -5,12 +5,12 @@ use super::free_response::{FreeResponse, free_response};
 use super::inverse::Inverse;
 use super::layout::Layout;
 use super::number::Number;
-use super::phase::{Phase, PhaseCallback};
 use super::plan::{BlockPlan, Bounds, SymbolicAnalysis};
 use super::probe::{Probe, Squares};
 use super::problem::Problem;
 use super::sweep::Sweep;
 use super::system::System;
+use super::tasks::{Phase, PhaseCallback};
 use super::tree::Tree;
 use crate::fem::SymmetricCsc;
 use crate::green::accuracy::Accuracy;
@@ -113,22 +113,17 @@ pub fn factorize(
     Ok(Factorization { stiffness, layout, route, sweeps, response, precision, accuracy })
 }
 
-/// The formats that the memory allows, the cheapest first.
-fn fitting(prepared: &SymbolicAnalysis, bounds: Bounds) -> Result<Vec<(Precision, BlockPlan)>> {
-    let routes =
-        Precision::ALL.map(|precision| prepared.plan_blocks(precision, bounds).map(|route| (precision, route)));
-    let mut refusal = None;
-    let mut fitting = Vec::new();
-    for route in routes {
-        match route {
-            Ok(route) => fitting.push(route),
-            Err(error) => refusal = refusal.or(Some(error)),
-        }
+/// The formats that the memory allows, the cheapest first: at least one.
+///
+/// # Errors
+/// A bound of memory that the cheapest cannot keep.
+pub fn fitting(prepared: &SymbolicAnalysis, bounds: Bounds) -> Result<Vec<(Precision, BlockPlan)>> {
+    let plan = |precision| Some((precision, prepared.plan_blocks(precision, bounds).ok()?));
+    let fitting: Vec<_> = Precision::ALL.into_iter().filter_map(plan).collect();
+    if fitting.is_empty() {
+        prepared.plan_blocks(Precision::F16, bounds)?;
     }
-    match refusal {
-        Some(error) if fitting.is_empty() => Err(error),
-        _ => Ok(fitting),
-    }
+    Ok(fitting)
 }
 
 /// A format with its accuracy.

@@ -46,10 +46,7 @@ pub fn free_response<C: Number>(
     }
     let free: Vec<f64> = supports.free.iter().map(|&dof| loads[dof as usize]).collect();
     let Some(found) = inverse.refined(&free) else { return Ok(None) };
-    let displacement = |dof: u32| match supports.free_rank[dof as usize] {
-        u32::MAX => 0.0,
-        rank => found.columns[rank as usize],
-    };
+    let displacement = |dof: u32| found.columns.get(supports.free_rank[dof as usize] as usize).copied().unwrap_or(0.0);
     let of_row = |&dof: &u32| {
         if supports.is_fixed(dof) {
             stiffness.column(dof as usize).map(|(other, k)| k * displacement(other)).sum()

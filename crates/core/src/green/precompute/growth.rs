@@ -4,19 +4,15 @@
 //! of that path always finds a complete store. Nodes requested meanwhile become the next stage, and the others are put into new
 //! stages around them; finished blocks stay.
 
-use std::sync::{Mutex, PoisonError};
-
-use glam::DVec3;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use super::column_store::ColumnStore;
 use super::columns::Columns;
 use super::problem::Problem;
 use super::solving::{Work, solve};
-use super::stages::{by_distance, split_growing, stages};
+use super::stages::stages;
 use super::tasks::Progress;
-use crate::Error;
-use crate::Result;
-use std::sync::Arc;
+use crate::{Error, Result};
 
 /// Order in which a store grows, and callbacks.
 pub struct Growth<'a> {
@@ -29,11 +25,6 @@ pub struct Growth<'a> {
 }
 
 impl Growth<'_> {
-    /// Touchable nodes by stages.
-    pub fn stages(&self, problem: &Problem) -> Vec<Vec<u32>> {
-        stages(&positions(problem), &problem.touch, self.first)
-    }
-
     /// Solves the missing blocks, and writes the store of every stage but the last.
     ///
     /// # Errors
@@ -57,9 +48,10 @@ impl Growth<'_> {
             let parts = &columns.parts;
             let prefix = store.begun();
             let waiting = parts.layout.waiting_nodes(prefix);
-            let stages = around(&positions(problem), &waiting, &painted, problem.touch.len() - waiting.len());
+            let ready = problem.touch.len() - waiting.len();
+            let stages = stages(&problem.surface_positions(), &waiting, &painted, ready);
             store.arrange(Arc::new(parts.with_stages(prefix, &stages)))?;
-            columns.arrange(Arc::clone(store.parts()));
+            columns.arrange(Arc::clone(&store.parts));
         }
         Ok(())
     }
@@ -104,7 +96,7 @@ impl Growth<'_> {
         };
         solve(
             columns,
-            store.blocks(),
+            &store.blocks,
             (blocks, store.done()),
             Work { begin: &begin, put: &|k, p| store.put(k, p) },
             progress,
@@ -112,17 +104,4 @@ impl Growth<'_> {
         let painted = painted.into_inner().map_err(|_| Error::Interrupted)?;
         Ok(painted)
     }
-}
-
-/// Rest positions of the surface nodes, m.
-fn positions(problem: &Problem) -> Vec<DVec3> {
-    problem.surface_nodes.iter().map(|&n| problem.mesh.nodes[n as usize]).collect()
-}
-
-/// Stages of the remaining nodes: the painted ones, then the others by their distance from them; `ready` are done.
-fn around(positions: &[DVec3], waiting: &[u32], painted: &[u32], ready: usize) -> Vec<Vec<u32>> {
-    let (painted, mut others): (Vec<u32>, Vec<u32>) = waiting.iter().partition(|node| painted.contains(node));
-    by_distance(positions, &mut others, &painted);
-    let before = ready + painted.len();
-    std::iter::once(painted).chain(split_growing(others, before)).collect()
 }

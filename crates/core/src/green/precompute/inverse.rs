@@ -12,7 +12,7 @@ use super::tree::{PositionRequest, Tree};
 use crate::fem::{Supports, SymmetricCsc};
 use crate::solver::Symbolic;
 use crate::solver::front::Eliminated;
-use crate::solver::multifrontal::{Columns, Schedule};
+use crate::solver::multifrontal::Schedule;
 use crate::{Error, Result};
 
 /// Corrections stop when one is smaller than this part of the answer in the energy norm, or after so many.
@@ -55,7 +55,20 @@ impl<'a, C: Number> Inverse<'a, C> {
         interrupt: &(dyn Fn() -> Result<()> + Sync),
     ) -> Result<Self> {
         let supernodes = symbolic.supernodes()?;
-        let columns = Permuted::new(positions, stiffness, supports);
+        let mut ranks = vec![0; positions.len()];
+        for (rank, &position) in positions.iter().enumerate() {
+            ranks[position as usize] = rank;
+        }
+        // The matrix of the free dofs in the order of elimination.
+        let columns = |position: usize, see: &mut dyn FnMut(usize, f64)| {
+            for (row, value) in stiffness.column(supports.free[ranks[position]] as usize) {
+                if let Some(&row) = positions.get(supports.free_rank[row as usize] as usize)
+                    && row as usize >= position
+                {
+                    see(row as usize, value);
+                }
+            }
+        };
         let keep = |factor: &Eliminated| Operator::<C>::all(factor);
         let operators = schedule.run(supernodes, &columns, &keep, interrupt)?.into_iter().flatten().collect();
         let everything = PositionRequest { supports: true, ..PositionRequest::NOTHING };
@@ -155,38 +168,6 @@ pub fn subtract_product(stiffness: &SymmetricCsc, supports: &Supports, x: &[f64]
     for (r, &dof) in residual.iter_mut().zip(&supports.free) {
         let free = |(other, k): (u32, f64)| x.get(supports.free_rank[other as usize] as usize).map_or(0.0, |x| k * x);
         *r -= stiffness.column(dof as usize).map(free).sum::<f64>();
-    }
-}
-
-/// The matrix of the free dofs in the order of elimination.
-struct Permuted<'a> {
-    stiffness: &'a SymmetricCsc,
-    supports: &'a Supports,
-    positions: &'a [u32],
-    /// Rank of each position's dof.
-    ranks: Vec<u32>,
-}
-
-impl<'a> Permuted<'a> {
-    fn new(positions: &'a [u32], stiffness: &'a SymmetricCsc, supports: &'a Supports) -> Self {
-        let mut ranks = vec![0; positions.len()];
-        for (rank, &position) in positions.iter().enumerate() {
-            ranks[position as usize] = rank as u32;
-        }
-        Self { stiffness, supports, positions, ranks }
-    }
-}
-
-impl Columns for Permuted<'_> {
-    fn each(&self, position: usize, see: &mut dyn FnMut(usize, f64)) {
-        let dof = self.supports.free[self.ranks[position] as usize];
-        for (row, value) in self.stiffness.column(dof as usize) {
-            if let Some(&row) = self.positions.get(self.supports.free_rank[row as usize] as usize)
-                && row as usize >= position
-            {
-                see(row as usize, value);
-            }
-        }
     }
 }
 

@@ -7,9 +7,7 @@
 
 use std::ops::Range;
 
-use super::block::Block;
 use super::problem::Problem;
-use super::runs::runs;
 use super::sweep::Source;
 use super::tree::{NONE, PositionRequest, Tree};
 use crate::fem::{Supports, SymmetricCsc};
@@ -30,8 +28,8 @@ pub struct Layout {
     ranks: Vec<u32>,
     /// Place of each rank with a column.
     places: Vec<u32>,
-    /// The columns by stages.
-    stages: Vec<Stage>,
+    /// The columns by stages, in their order.
+    pub stages: Vec<Stage>,
     /// For each dof its rank, or [`NONE`].
     rank_of_dof: Vec<u32>,
     /// Permuted position of each free dof.
@@ -49,16 +47,31 @@ pub struct Stage {
     pub forces: Range<usize>,
 }
 
+/// A block of columns that are solved together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Block {
+    /// First column, in the order of elimination.
+    pub first: usize,
+    /// Number of columns.
+    pub width: usize,
+    /// Rows of its panel.
+    pub rows: usize,
+}
+
+impl Block {
+    /// Numbers in its panel.
+    pub fn len(&self) -> usize {
+        self.rows * self.width
+    }
+}
+
 impl Layout {
     /// Rows and columns of a problem whose free dofs are ordered by `symbolic`, in one stage.
     pub fn new(problem: &Problem, stiffness: &SymmetricCsc, symbolic: &Symbolic) -> Self {
         let supports = &problem.supports;
         let row_dofs = problem.row_dofs();
         let positions = symbolic.positions();
-        let at = |dof: u32| match supports.free_rank[dof as usize] {
-            NONE => None,
-            rank => Some(positions[rank as usize]),
-        };
+        let at = |dof: u32| positions.get(supports.free_rank[dof as usize] as usize).copied();
         let mut has_column = vec![false; row_dofs.len()];
         for row in problem.touch.iter().flat_map(|&t| [3 * t, 3 * t + 1, 3 * t + 2]) {
             has_column[row as usize] = true;
@@ -158,20 +171,16 @@ impl Layout {
     /// Sets the readers of each position: a row with a column is read by its own stage and those before it.
     fn find_requests(&mut self, stiffness: &SymmetricCsc, supports: &Supports) {
         let mut requests = vec![PositionRequest::NOTHING; self.positions.len()];
-        let at = |dof: u32| match supports.free_rank[dof as usize] {
-            NONE => None,
-            rank => Some(self.positions[rank as usize] as usize),
-        };
         let stage_of = |rank: usize| self.places.get(rank).map_or(NONE, |&place| self.stage_of(place as usize) as u32);
         for (rank, &row) in self.row_of_rank.iter().enumerate() {
             let (dof, stage) = (self.row_dofs[row as usize], stage_of(rank));
-            if let Some(position) = at(dof) {
+            if let Some(position) = self.position(supports, dof) {
                 requests[position].stage = stage;
                 requests[position].before = requests[position].before.max(stage);
                 continue;
             }
             // Positions that enter reactions: every column before their own reads them.
-            for position in stiffness.column(dof as usize).filter_map(|(other, _)| at(other)) {
+            for position in stiffness.column(dof as usize).filter_map(|(other, _)| self.position(supports, other)) {
                 requests[position].supports = true;
                 requests[position].before = requests[position].before.max(stage);
             }
@@ -187,11 +196,6 @@ impl Layout {
     /// Number of rows.
     pub fn rows(&self) -> usize {
         self.row_of_rank.len()
-    }
-
-    /// The stages, in their order.
-    pub fn stages(&self) -> &[Stage] {
-        &self.stages
     }
 
     /// Stage of a place.
@@ -259,10 +263,12 @@ impl Layout {
 
     /// Kept row of a dof, if it is free.
     pub fn tree_row(&self, tree: &Tree, supports: &Supports, dof: u32) -> Option<u32> {
-        match supports.free_rank[dof as usize] {
-            NONE => None,
-            rank => Some(tree.row_of_position[self.positions[rank as usize] as usize]),
-        }
+        self.position(supports, dof).map(|position| tree.row_of_position[position])
+    }
+
+    /// Permuted position of a dof, if it is free.
+    fn position(&self, supports: &Supports, dof: u32) -> Option<usize> {
+        self.positions.get(supports.free_rank[dof as usize] as usize).map(|&position| position as usize)
     }
 
     /// Loads of the places of a block: a unit force on a free dof, `-K_Nj` for a unit displacement of support `j`.
@@ -282,6 +288,19 @@ impl Layout {
         }
         sources
     }
+}
+
+/// Joins numbers that follow each other.
+pub fn runs(numbers: impl Iterator<Item = u32>) -> Vec<Range<usize>> {
+    let mut runs: Vec<Range<usize>> = Vec::new();
+    for number in numbers {
+        let number = number as usize;
+        match runs.last_mut() {
+            Some(run) if run.end == number => run.end += 1,
+            _ => runs.push(number..number + 1),
+        }
+    }
+    runs
 }
 
 #[cfg(test)]

@@ -4,54 +4,69 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::arrangement::Arrangement;
-use super::block::Block;
-use super::layout::Layout;
+use super::columns::AssembledProblem;
+use super::layout::{Block, runs};
 use super::number::Number;
 use super::panels::Panels;
-use super::runs::runs;
 use super::tasks::in_tasks;
 use crate::Result;
+use crate::green::entries::scales;
+use crate::green::precision::Precision;
 
-/// The panels and their order.
+/// Panels that are finished, and their order.
 pub struct Mirror<'a, T> {
-    /// Rows and columns.
-    pub layout: &'a Layout,
-    /// Their blocks.
+    /// Matrix, rows and columns.
+    pub parts: &'a AssembledProblem,
+    /// Order of rows and columns in the store.
     pub arrangement: &'a Arrangement,
     /// Blocks of columns that are ready: the first ones.
     pub blocks: &'a [Block],
     /// Their panels.
     pub panels: &'a Panels<T>,
-}
-
-/// Numbers that one task of [`Mirror::columns`] needs.
-pub fn numbers(layout: &Layout, width: usize) -> usize {
-    (2 * width + 1) * layout.rows()
+    /// Blocks put together at a time.
+    pub tasks: usize,
 }
 
 /// Rows of a panel that are read at a time, at most.
 const ROWS_AT_ONCE: usize = 256;
 
 impl<T: Number> Mirror<'_, T> {
-    /// Calls `take(place in the order, rows in the order of the store)` for every column, from up to `tasks` tasks at a time.
+    /// Calls `put(column of the store, bytes)` for every column, from several tasks at a time. `magnitude` are the bounds of
+    /// the stored rows. A task has `2 width + 1` numbers a row in memory, as the plan counts them.
     ///
     /// # Errors
-    /// That of reading a panel, or of `take`.
-    pub fn columns(&self, tasks: usize, take: &(dyn Fn(usize, &[T]) -> Result<()> + Sync)) -> Result<()> {
+    /// That of reading a panel, or of `put`.
+    pub fn columns(
+        &self,
+        precision: Precision,
+        magnitude: &[f64],
+        put: &(dyn Fn(usize, &[u8]) -> Result<()> + Sync),
+    ) -> Result<()> {
+        let inverse: Vec<f64> = scales(precision, magnitude).into_iter().map(|scale| 1.0 / scale).collect();
+        let store = |place: usize, numbers: &[T]| {
+            let column = self.arrangement.column(&self.parts.layout, place);
+            if precision != Precision::F16 {
+                return put(column, bytemuck::cast_slice(numbers));
+            }
+            let mut quantised = vec![0i16; numbers.len()];
+            quantise(numbers, inverse[column], &inverse, &mut quantised);
+            put(column, bytemuck::cast_slice(&quantised))
+        };
         let next = AtomicUsize::new(0);
-        in_tasks(tasks, &|| {
-            let (mut lines, mut panel, mut column) = (Vec::new(), Vec::new(), vec![T::default(); self.layout.rows()]);
+        in_tasks(self.tasks, &|| {
+            let (mut lines, mut panel, mut column) =
+                (Vec::new(), Vec::new(), vec![T::default(); self.parts.layout.rows()]);
             loop {
                 let block = next.fetch_add(1, Ordering::Relaxed);
                 if block >= self.blocks.len() {
                     return Ok(());
                 }
                 self.lines(block, &mut lines, &mut panel)?;
-                for (k, line) in lines.chunks_exact(self.layout.rows()).enumerate() {
+                for (k, line) in lines.chunks_exact(self.parts.layout.rows()).enumerate() {
                     for (value, &rank) in column.iter_mut().zip(&self.arrangement.rank_of_stored) {
                         *value = line[rank as usize];
                     }
-                    take(self.blocks[block].first + k, &column)?;
+                    store(self.blocks[block].first + k, &column)?;
                 }
             }
         })
@@ -59,17 +74,17 @@ impl<T: Number> Mirror<'_, T> {
 
     /// The columns of a block with all their rows by rank.
     fn lines(&self, index: usize, lines: &mut Vec<T>, panel: &mut Vec<T>) -> Result<()> {
-        let (block, length) = (&self.blocks[index], self.layout.rows());
-        let ranks = self.layout.ranks(block);
+        let (block, length) = (&self.blocks[index], self.parts.layout.rows());
+        let ranks = self.parts.layout.ranks(block);
         lines.resize(block.width * length, T::default());
         // Of the ranks below each column's own, how many are solved so far: no panel after them has their rows.
         let mut solved = vec![0; block.width];
         for (earlier_index, earlier) in self.blocks[..index].iter().enumerate() {
-            let theirs = self.layout.ranks(earlier);
+            let theirs = self.parts.layout.ranks(earlier);
             let below = ranks.iter().map(|&rank| theirs.partition_point(|&other| other < rank));
             solved.iter_mut().zip(below).for_each(|(solved, below)| *solved += below);
             self.rows(earlier_index, &solved, ranks, panel)?;
-            let other_kind = self.layout.moves_supports(earlier) != self.layout.moves_supports(block);
+            let other_kind = self.parts.layout.moves_supports(earlier) != self.parts.layout.moves_supports(block);
             let runs = runs(theirs.iter().copied());
             for (line, mut piece) in lines.chunks_exact_mut(length).zip(panel.chunks_exact(earlier.width)) {
                 for run in &runs {
@@ -87,7 +102,7 @@ impl<T: Number> Mirror<'_, T> {
         panel.resize(block.len(), T::default());
         self.panels.get(index, 0, panel)?;
         let mut row = 0;
-        for run in self.layout.panel_rows(block) {
+        for run in self.parts.layout.panel_rows(block) {
             let part = &panel[row * block.width..(row + run.len()) * block.width];
             transpose_into(part, block.width, lines, length, run.start);
             row += run.len();
@@ -134,11 +149,11 @@ impl<T: Number> Mirror<'_, T> {
     /// That of reading a panel.
     pub fn rows_without_column(&self, see: &mut dyn FnMut(usize, usize, T)) -> Result<()> {
         let ready: usize = self.blocks.iter().map(|block| block.width).sum();
-        let waits = |rank: &u32| self.layout.place_of_rank(*rank as usize).is_none_or(|place| place >= ready);
+        let waits = |rank: &u32| self.parts.layout.place_of_rank(*rank as usize).is_none_or(|place| place >= ready);
         let mut values = Vec::new();
         for (index, block) in self.blocks.iter().enumerate() {
             let mut row = 0;
-            for run in self.layout.panel_rows(block) {
+            for run in self.parts.layout.panel_rows(block) {
                 for waiting in runs((run.start as u32..run.end as u32).filter(waits)) {
                     for rank in waiting.clone().step_by(ROWS_AT_ONCE) {
                         let count = ROWS_AT_ONCE.min(waiting.end - rank);
@@ -168,5 +183,13 @@ fn transpose_into<T: Number>(panel: &[T], width: usize, lines: &mut [T], length:
                 }
             }
         }
+    }
+}
+
+/// `q` of a column from its entries, the inverse scales being given.
+fn quantise<T: Number>(column: &[T], column_inverse: f64, row_inverses: &[f64], out: &mut [i16]) {
+    for ((q, value), inverse) in out.iter_mut().zip(column).zip(row_inverses) {
+        // The conversion saturates, where rounding has crossed the bound.
+        *q = (value.to_f64() * (inverse * column_inverse)).round() as i16;
     }
 }

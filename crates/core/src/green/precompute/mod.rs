@@ -5,12 +5,10 @@
 //! ([`ColumnStore`]). Both may run in one process, or the columns in several. The columns are solved in stages ([`Growth`]).
 
 mod arrangement;
-mod block;
 mod claim;
 mod column_store;
 mod columns;
 mod factorization;
-mod finish;
 mod free_response;
 mod growth;
 mod inverse;
@@ -20,13 +18,11 @@ mod number;
 mod operators;
 mod panels;
 mod partial;
-mod phase;
 mod plan;
 mod probe;
 mod problem;
 mod rate;
 mod run;
-mod runs;
 mod scales;
 mod solving;
 mod spatial_order;
@@ -41,10 +37,9 @@ pub use column_store::{ColumnStore, PreviousWork, Target, checksum};
 pub use columns::{AssembledProblem, Columns, Measurement, TaskMemory};
 pub use factorization::RequestedPrecision;
 pub use growth::Growth;
-pub use phase::{Phase, PhaseCallback};
 pub use plan::Plan;
 pub use problem::Problem;
 pub use rate::products;
 pub use run::{plan, precompute, precompute_to};
 pub(crate) use spatial_order::spatial_order;
-pub use tasks::Progress;
+pub use tasks::{Phase, PhaseCallback, Progress};

@@ -1,35 +1,21 @@
 //! Number types for computing and storing.
 
 use std::iter::Sum;
-use std::ops::{AddAssign, Neg, SubAssign};
 
 use bytemuck::Pod;
-use faer::traits::ComplexField;
+use faer::traits::{RealField, math_utils};
 
 /// `f32` or `f64`.
-pub trait Number:
-    ComplexField + Pod + Default + Neg<Output = Self> + AddAssign + SubAssign + Sum + Send + Sync
-{
+pub trait Number: RealField + Pod + Default + Into<f64> + Sum {
     /// Nearest number.
-    fn from_f64(x: f64) -> Self;
+    fn from_f64(x: f64) -> Self {
+        math_utils::from_f64(x)
+    }
     /// Exactly.
-    fn to_f64(self) -> f64;
-}
-
-impl Number for f32 {
-    fn from_f64(x: f64) -> Self {
-        x as f32
-    }
     fn to_f64(self) -> f64 {
-        f64::from(self)
+        self.into()
     }
 }
 
-impl Number for f64 {
-    fn from_f64(x: f64) -> Self {
-        x
-    }
-    fn to_f64(self) -> f64 {
-        self
-    }
-}
+impl Number for f32 {}
+impl Number for f64 {}

@@ -8,15 +8,13 @@
 //! process writes it at a time ([`Claim`]); before a store made of its panels gets its name, they are compared with their
 //! sums once more ([`Partial::verify`]).
 
-use std::fs::File;
 use std::io;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use rayon::prelude::*;
 
-use super::block::Block;
 use super::claim::Claim;
-use super::layout::Layout;
+use super::layout::{Block, Layout};
 use crate::positioned::Positioned;
 use crate::{Error, Result};
 
@@ -85,14 +83,14 @@ impl Partial {
         let mut header = vec![b' '; HEADER];
         header[..description.len()].copy_from_slice(description.as_bytes());
         let mut start = vec![0; HEADER];
-        let same = claim.file().read_exact_at(&mut start, 0).is_ok() && start == header;
+        let same = claim.file.read_exact_at(&mut start, 0).is_ok() && start == header;
         let (columns, rows, blocks) = (layout.columns, layout.rows(), Vec::new());
         let mut partial = Self { claim, columns, rows, number: bytes_per_number, blocks };
         if same {
             partial.find_blocks().map_err(|error| partial.io(error))?;
             return Ok((partial, false));
         }
-        let file = partial.file();
+        let file = &partial.claim.file;
         let found = file.metadata().is_ok_and(|now| now.len() > 0);
         let begun = file.set_len(0).and_then(|()| file.write_all_at(&header, 0));
         if let Err(error) = begun.and_then(|()| file.set_len(partial.panels())) {
@@ -102,13 +100,9 @@ impl Partial {
         Ok((partial, found))
     }
 
-    fn file(&self) -> &File {
-        self.claim.file()
-    }
-
     /// Errors name the store, for the user has not named the file beside it.
     fn io(&self, source: io::Error) -> Error {
-        Error::Io { path: self.claim.target().to_owned(), source }
+        Error::Io { path: self.claim.target.clone(), source }
     }
 
     /// First byte of the panels.
@@ -119,8 +113,8 @@ impl Partial {
     /// Finds the blocks listed in the file, and those of them with correct sums.
     fn find_blocks(&mut self) -> io::Result<()> {
         let (mut table, mut sums) = (vec![0u32; self.columns], vec![0; SUM * self.columns]);
-        if self.file().read_exact_at(bytemuck::cast_slice_mut(&mut table), HEADER as u64).is_err()
-            || self.file().read_exact_at(&mut sums, self.sum_at(0)).is_err()
+        if self.claim.file.read_exact_at(bytemuck::cast_slice_mut(&mut table), HEADER as u64).is_err()
+            || self.claim.file.read_exact_at(&mut sums, self.sum_at(0)).is_err()
         {
             return Ok(());
         }
@@ -136,7 +130,7 @@ impl Partial {
             let block = self.next(rows.iter().map(|entry| entry & !BLOCK_START).collect());
             let sum = &sums[SUM * block.first..][..SUM];
             panel.resize(block.length, 0);
-            if sum.iter().any(|&byte| byte != 0) && self.file().read_exact_at(&mut panel, block.start).is_ok() {
+            if sum.iter().any(|&byte| byte != 0) && self.claim.file.read_exact_at(&mut panel, block.start).is_ok() {
                 *block.sum() = Some(block.sum_of(&panel)).filter(|found| found.as_bytes() == sum);
             }
             self.blocks.push(block);
@@ -182,7 +176,7 @@ impl Partial {
             self.blocks.push(block);
         }
         let table = bytemuck::cast_slice(&table);
-        self.file().write_all_at(table, HEADER as u64).map_err(|error| self.io(error))
+        self.claim.file.write_all_at(table, HEADER as u64).map_err(|error| self.io(error))
     }
 
     /// Offset of the checksum of the block that begins with a column.
@@ -202,9 +196,10 @@ impl Partial {
     pub fn put(&self, block: usize, panel: &[u8]) -> Result<()> {
         let block = &self.blocks[block];
         let sum = block.sum_of(panel);
-        self.file()
+        self.claim
+            .file
             .write_all_at(panel, block.start)
-            .and_then(|()| self.file().write_all_at(sum.as_bytes(), self.sum_at(block.first)))
+            .and_then(|()| self.claim.file.write_all_at(sum.as_bytes(), self.sum_at(block.first)))
             .map_err(|error| self.io(error))?;
         *block.sum() = Some(sum);
         Ok(())
@@ -216,7 +211,7 @@ impl Partial {
     /// The operating system's.
     pub fn get(&self, block: usize, at: usize, out: &mut [u8]) -> Result<()> {
         let at = self.blocks[block].start + at as u64;
-        self.file().read_exact_at(out, at).map_err(|error| self.io(error))
+        self.claim.file.read_exact_at(out, at).map_err(|error| self.io(error))
     }
 
     /// Compares the first blocks with the sums that they had when they were finished. Called after they were read,
@@ -227,7 +222,7 @@ impl Partial {
     pub fn verify(&self, blocks: usize) -> Result<()> {
         self.blocks[..blocks].par_iter().try_for_each_init(Vec::new, |panel, block| {
             panel.resize(block.length, 0);
-            self.file().read_exact_at(panel, block.start).map_err(|error| self.io(error))?;
+            self.claim.file.read_exact_at(panel, block.start).map_err(|error| self.io(error))?;
             let mut sum = block.sum();
             if *sum == Some(block.sum_of(panel)) {
                 return Ok(());
@@ -235,9 +230,9 @@ impl Partial {
             *sum = None;
             let reason = format!(
                 "another program has changed its finished columns in {}; run the same command again to compute them anew",
-                self.claim.path().display()
+                self.claim.path.display()
             );
-            Err(Error::Store { path: self.claim.target().to_owned(), reason })
+            Err(Error::store(&self.claim.target, reason))
         })
     }
 
@@ -269,15 +264,19 @@ mod tests {
         std::env::temp_dir().join(format!("palpate-{}-{name}", std::process::id()))
     }
 
+    fn put_both(partial: &Partial) {
+        partial.put(0, &[7; 24]).expect("a writable file");
+        partial.put(1, &[8; 4]).expect("a writable file");
+    }
+
     #[test]
     fn torn_and_foreign_blocks_are_not_believed() {
         let path = store("torn");
         let (partial, discarded, begun) = open(&path, "one", &[2, 0, 1]);
         assert!(!discarded && !partial.has(0) && !partial.has(1) && begun.is_empty());
-        partial.put(0, &[7; 24]).expect("a writable file");
-        partial.put(1, &[8; 4]).expect("a writable file");
+        put_both(&partial);
         // The file has the sum of the second block, but not its numbers.
-        partial.file().write_all_at(&[9; 4], partial.blocks[1].start).expect("a writable file");
+        partial.claim.file.write_all_at(&[9; 4], partial.blocks[1].start).expect("a writable file");
         drop(partial);
         let (resumed, discarded, begun) = open(&path, "one", &[2, 0, 1]);
         assert!(!discarded && resumed.has(0) && !resumed.has(1));
@@ -299,8 +298,7 @@ mod tests {
     fn a_block_behind_others_than_it_was_computed_behind_is_not_believed() {
         let path = store("behind");
         let (partial, ..) = open(&path, "one", &[0, 1, 2]);
-        partial.put(0, &[7; 24]).expect("a writable file");
-        partial.put(1, &[8; 4]).expect("a writable file");
+        put_both(&partial);
         drop(partial);
         // The last block keeps its row and its place; the rows of its panel are others'.
         drop(open(&path, "one", &[1, 0, 2]));
@@ -313,10 +311,9 @@ mod tests {
     fn a_block_that_is_changed_after_it_was_finished_is_refused() {
         let path = store("changed");
         let (partial, ..) = open(&path, "one", &[0, 1, 2]);
-        partial.put(0, &[7; 24]).expect("a writable file");
-        partial.put(1, &[8; 4]).expect("a writable file");
+        put_both(&partial);
         partial.verify(2).expect("the panels as they were written");
-        partial.file().write_all_at(&[9; 4], partial.blocks[0].start).expect("a writable file");
+        partial.claim.file.write_all_at(&[9; 4], partial.blocks[0].start).expect("a writable file");
         assert!(partial.verify(2).is_err() && !partial.has(0) && partial.has(1));
         partial.discard();
     }
@@ -329,7 +326,7 @@ mod tests {
         drop(claim);
         assert!(!super::super::claim::partial_path(&path).exists(), "nothing was begun");
         let claim = Claim::take(&path).expect("a writable folder").expect("nobody else's store");
-        claim.file().set_len(1).expect("a writable file");
+        claim.file.set_len(1).expect("a writable file");
         claim.discard();
         // A removed file excludes no other process, and dropping it removes no other file.
         let next = Claim::take(&path).expect("a writable folder").expect("nobody else's store");

@@ -2,20 +2,18 @@
 
 use rayon::current_num_threads;
 
-use super::block::Block;
-use super::layout::Layout;
-use super::mirror;
+use super::layout::{Block, Layout};
 use super::operators::operator_numbers;
-use super::phase::{Phase, PhaseCallback};
 use super::probe;
 use super::problem::Problem;
 use super::sweep::{loaded, scratch_numbers};
 use super::system::System;
+use super::tasks::{Phase, PhaseCallback};
 use super::tree::Tree;
 use crate::fem::SymmetricCsc;
 use crate::green::precision::Precision;
 use crate::solver::Symbolic;
-use crate::solver::multifrontal::Schedule;
+use crate::solver::multifrontal::{Schedule, sizes};
 use crate::{Error, Result};
 
 /// Columns of a block, best first: enough for the matrix products, few enough for the cache and to share among tasks.
@@ -176,11 +174,10 @@ impl Sizes {
         let (stored, computed) = (precision.panel_bytes(), precision.computed_bytes());
         let (dofs, threads) = (stiffness.dimension, current_num_threads());
         let structure = 8 * supernodes.row_idx().len() + 64 * dofs + 4 * tree.boundaries.len();
-        let sizes = |s: usize| {
-            let size = supernodes.supernode_end()[s] - supernodes.supernode_begin()[s];
-            (size, supernodes.supernode(s).pattern().len())
+        let result_numbers = |s: usize| {
+            let (size, boundary) = sizes(supernodes, s);
+            computed * operator_numbers(size, boundary)
         };
-        let result_numbers = |s: usize| computed * operator_numbers(sizes(s).0, sizes(s).1);
         let fronts = schedule.peak_bytes(supernodes, threads, &result_numbers);
         let whole: usize = (0..supernodes.n_supernodes()).map(result_numbers).sum();
         // The loads of some columns, the columns, residual and correction; and the same in the sweep, with its entries.
@@ -204,7 +201,8 @@ impl Sizes {
     fn peak(&self, layout: &Layout, tree: &Tree, width: usize, tasks: usize) -> usize {
         let panel = self.stored * width * layout.rows();
         let solving = self.operators + tasks * (self.computed * scratch_numbers(tree, width) + panel);
-        let mirroring = tasks * self.stored * mirror::numbers(layout, width);
+        // By `Mirror::columns`.
+        let mirroring = tasks * self.stored * (2 * width + 1) * layout.rows();
         self.matrix + self.result + self.factorising.max(self.probing).max(solving).max(mirroring)
     }
 

@@ -1,8 +1,10 @@
 //! The reference problem: a supported body, and the key of its Green's function.
 
+use glam::DVec3;
+
 use crate::Result;
 use crate::fem::{Isotropic, Supports};
-use crate::green::key::ContentKey;
+use crate::green::key::{FORMAT_VERSION, add_sections};
 use crate::green::precision::Precision;
 use crate::mesh::{Faces, Surface, TetMesh};
 
@@ -25,7 +27,7 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// Content key of the Green's function with this precision (`None`: chosen by the body): mesh, materials, supports,
+    /// Content key (hexadecimal, BLAKE3) of the Green's function with this precision (`None`: chosen by the body): mesh, materials, supports,
     /// loads, touch region.
     ///
     /// The order of the columns and the width of the blocks are no part of it. Both depend on the nodes requested first and on the
@@ -37,16 +39,24 @@ impl Problem {
 
     /// The keys of this problem for any touch region.
     pub fn key_of_touch(&self, precision: Option<Precision>) -> TouchKey {
-        let mut key = ContentKey::new(self.mesh.tets.element_name(), precision);
-        key.section(bytemuck::cast_slice(&self.mesh.nodes));
-        key.section(bytemuck::cast_slice(self.mesh.tets.as_flattened()));
+        let (element, precision) = (self.mesh.tets.element_name(), precision.map_or("chosen", Precision::name));
+        let mut key = blake3::Hasher::new();
+        key.update(format!("palpate green {FORMAT_VERSION} {element} {precision}").as_bytes());
+        let mesh: [&[u8]; 2] =
+            [bytemuck::cast_slice(&self.mesh.nodes), bytemuck::cast_slice(self.mesh.tets.as_flattened())];
+        add_sections(&mut key, mesh);
         for material in &self.materials {
             // Density does not enter the static answer.
-            key.section(bytemuck::cast_slice(&[material.youngs_modulus, material.poissons_ratio]));
+            let constants = [material.youngs_modulus, material.poissons_ratio];
+            add_sections(&mut key, [bytemuck::cast_slice(&constants)]);
         }
-        key.section(bytemuck::cast_slice(&self.supports.fixed));
-        key.section(bytemuck::cast_slice(&self.surface_nodes));
+        add_sections(&mut key, [&self.supports.fixed, &self.surface_nodes].map(|part| bytemuck::cast_slice(part)));
         TouchKey { before: key, loads: self.loads.clone() }
+    }
+
+    /// Rest positions of the surface nodes, m.
+    pub fn surface_positions(&self) -> Vec<DVec3> {
+        self.surface_nodes.iter().map(|&n| self.mesh.nodes[n as usize]).collect()
     }
 
     /// The surface in its own numbering.
@@ -55,8 +65,7 @@ impl Problem {
     /// Faces of nodes that are not on the surface.
     pub fn surface(&self) -> Result<Surface> {
         let local = |n: u32| self.surface_nodes.binary_search(&n).ok().map(|i| i as u32);
-        let positions = self.surface_nodes.iter().map(|&n| self.mesh.nodes[n as usize]).collect();
-        Surface::new(positions, self.surface_faces.renumbered(local)?)
+        Surface::new(self.surface_positions(), self.surface_faces.renumbered(local)?)
     }
 
     /// Dof of every row: the surface's, then the supported ones inside.
@@ -79,7 +88,7 @@ impl Problem {
 
 /// Data of the key of a problem, without its touch region.
 pub struct TouchKey {
-    before: ContentKey,
+    before: blake3::Hasher,
     loads: Vec<f64>,
 }
 
@@ -87,10 +96,10 @@ impl TouchKey {
     /// The key with these touchable nodes, ascending ranks among the surface nodes.
     pub fn of(&self, touch: &[u32]) -> String {
         let mut key = self.before.clone();
-        key.section(bytemuck::cast_slice(touch));
+        add_sections(&mut key, [bytemuck::cast_slice(touch)]);
         if !self.loads.is_empty() {
-            key.section(bytemuck::cast_slice(&self.loads));
+            add_sections(&mut key, [bytemuck::cast_slice(&self.loads)]);
         }
-        key.finish()
+        key.finalize().to_hex().to_string()
     }
 }

@@ -6,16 +6,17 @@ use super::arrangement::Arrangement;
 use super::claim::Claim;
 use super::column_store::{ColumnStore, PreviousWork, Target, geometry};
 use super::columns::Columns;
-use super::factorization::RequestedPrecision;
-use super::finish::FinishedPanels;
+use super::factorization::{RequestedPrecision, fitting};
 use super::growth::Growth;
+use super::mirror::Mirror;
 use super::number::Number;
 use super::panels::Panels;
-use super::phase::Phase;
 use super::plan::{Bounds, Plan, SymbolicAnalysis};
 use super::problem::Problem;
+use super::scales::magnitudes;
 use super::solving::{Work, solve};
-use super::tasks::{Progress, report_progress, task_failed};
+use super::stages::stages;
+use super::tasks::{Phase, Progress, report_progress, task_failed};
 use crate::green::entries::Entries;
 use crate::green::function::GreensFunction;
 use crate::green::numbers::Numbers;
@@ -32,13 +33,7 @@ pub fn plan(problem: &Problem, precision: Option<Precision>, memory: Option<usiz
     let bounds = Bounds { memory, in_memory: false };
     let (precision, route) = match precision {
         Some(precision) => (precision, prepared.plan_blocks(precision, bounds)?),
-        None => {
-            let mut best = prepared.plan_blocks(Precision::F16, bounds).map(|route| (Precision::F16, route));
-            for precision in [Precision::F32, Precision::F64] {
-                best = prepared.plan_blocks(precision, bounds).map(|route| (precision, route)).or(best);
-            }
-            best?
-        }
+        None => fitting(&prepared, bounds)?.pop().ok_or_else(task_failed)?,
     };
     prepared.plan(problem, precision, &route)
 }
@@ -69,12 +64,12 @@ fn collect<T: Number>(columns: Columns, green: &mut GreensFunction, progress: Pr
     let arrangement = Arrangement::new(&green.surface.positions, &parts.layout, parts.layout.columns);
     // The factor's memory is free for the operator's.
     drop(columns);
-    let finished = FinishedPanels { parts: &parts, arrangement: &arrangement, blocks: &blocks, panels: &panels, tasks };
-    let magnitude = finished.magnitudes()?;
+    let mirror = Mirror { parts: &parts, arrangement: &arrangement, blocks: &blocks, panels: &panels, tasks };
+    let magnitude = magnitudes(&mirror)?;
     let mut numbers = Numbers::try_zeros(precision, parts.layout.columns * green.rows)?;
     let bytes = green.rows * precision.bytes();
     let places: Vec<Mutex<&mut [u8]>> = numbers.bytes_mut().chunks_mut(bytes).map(Mutex::new).collect();
-    finished.columns(precision, &magnitude, &|column, bytes| {
+    mirror.columns(precision, &magnitude, &|column, bytes| {
         places[column].lock().map_err(|_| task_failed())?.copy_from_slice(bytes);
         Ok(())
     })?;
@@ -105,9 +100,9 @@ pub fn precompute_to(
         report_progress(progress, 0, all)
     })?;
     let tasks = columns.tasks;
-    let stages = growth.stages(problem);
+    let stages = stages(&problem.surface_positions(), &problem.touch, growth.first, 0);
     let mut store = ColumnStore::open_in_stages(claim, problem, &columns.parts, &stages, &columns.measurement, target)?;
-    columns.arrange(Arc::clone(store.parts()));
+    columns.arrange(Arc::clone(&store.parts));
     found(store.previous);
     (target.phase)(Phase::Columns);
     let solved = growth.grow(problem, &mut columns, &mut store, progress);

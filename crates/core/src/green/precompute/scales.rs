@@ -13,17 +13,17 @@
 //! their bound, which have 15 bits here and 11 there (nodal forces under 20 neighbouring
 //! nodes: 1e-2 of the largest with halves).
 
+use super::columns::AssembledProblem;
 use super::mirror::Mirror;
 use super::number::Number;
 use crate::Result;
-use crate::fem::SymmetricCsc;
 
 /// Bound `s_i` of every row of the store.
 ///
 /// # Errors
 /// That of reading a panel.
-pub fn magnitudes<T: Number>(mirror: &Mirror<'_, T>, stiffness: &SymmetricCsc) -> Result<Vec<f64>> {
-    let Mirror { layout, arrangement, .. } = mirror;
+pub fn magnitudes<T: Number>(mirror: &Mirror<'_, T>) -> Result<Vec<f64>> {
+    let AssembledProblem { stiffness, layout, .. } = mirror.parts;
     let mut of_place: Vec<f64> = mirror.diagonal()?.into_iter().map(Number::to_f64).collect();
     for (place, square) in of_place.iter_mut().enumerate() {
         if layout.is_support(place) {
@@ -39,13 +39,5 @@ pub fn magnitudes<T: Number>(mirror: &Mirror<'_, T>, stiffness: &SymmetricCsc) -
     for (place, &value) in of_place.iter().enumerate() {
         of_rank[layout.rank(place)] = value;
     }
-    Ok(arrangement.rank_of_stored.iter().map(|&rank| of_rank[rank as usize]).collect())
-}
-
-/// `q` of a column from its entries, the inverse scales being given.
-pub fn quantise<T: Number>(column: &[T], column_inverse: f64, row_inverses: &[f64], out: &mut [i16]) {
-    for ((q, value), inverse) in out.iter_mut().zip(column).zip(row_inverses) {
-        // The conversion saturates, where rounding has crossed the bound.
-        *q = (value.to_f64() * (inverse * column_inverse)).round() as i16;
-    }
+    Ok(mirror.arrangement.rank_of_stored.iter().map(|&rank| of_rank[rank as usize]).collect())
 }

@@ -2,8 +2,8 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use super::block::Block;
 use super::columns::Columns;
+use super::layout::Block;
 use super::tasks::{Progress, in_tasks, report_progress};
 use crate::Result;
 

@@ -9,20 +9,20 @@ use glam::DVec3;
 const FEWEST_NODES: usize = 192;
 
 /// The nodes of `touch` (ascending ranks among the surface nodes at `positions`) in stages: those of `first`, then the
-/// others by their distance from the closest of those. One stage where `first` holds none of them, or all.
-pub fn stages(positions: &[DVec3], touch: &[u32], first: &[u32]) -> Vec<Vec<u32>> {
+/// others by their distance from the closest of those; `ready` nodes are computed before them. One stage where `first` holds
+/// none of them, or all.
+pub fn stages(positions: &[DVec3], touch: &[u32], first: &[u32], ready: usize) -> Vec<Vec<u32>> {
     let (first, mut others): (Vec<u32>, Vec<u32>) = touch.iter().partition(|node| first.contains(node));
     if first.is_empty() || others.is_empty() {
         return vec![touch.to_vec()];
     }
     by_distance(positions, &mut others, &first);
-    let mut stages = vec![first];
-    stages.extend(split_growing(others, stages[0].len()));
-    stages
+    let before = ready + first.len();
+    std::iter::once(first).chain(split_growing(others, before)).collect()
 }
 
 /// Sorts nodes by their distance from the closest node of a region.
-pub fn by_distance(positions: &[DVec3], nodes: &mut [u32], region: &[u32]) {
+fn by_distance(positions: &[DVec3], nodes: &mut [u32], region: &[u32]) {
     let distance = |node: &u32| -> f64 {
         let distances = region.iter().map(|&of| positions[of as usize].distance_squared(positions[*node as usize]));
         distances.fold(f64::INFINITY, f64::min)
@@ -33,7 +33,7 @@ pub fn by_distance(positions: &[DVec3], nodes: &mut [u32], region: &[u32]) {
 }
 
 /// Cuts sorted nodes into stages, each about as large as what is before it.
-pub fn split_growing(mut nodes: Vec<u32>, mut before: usize) -> Vec<Vec<u32>> {
+fn split_growing(mut nodes: Vec<u32>, mut before: usize) -> Vec<Vec<u32>> {
     let mut stages = Vec::new();
     while !nodes.is_empty() {
         let size = before.max(FEWEST_NODES);
@@ -55,7 +55,7 @@ mod tests {
         let positions: Vec<DVec3> = (0..4000u32).map(|i| DVec3::new(f64::from(i * 7 % 4000), 0.0, 0.0)).collect();
         let touch: Vec<u32> = (0..4000).filter(|i| i % 3 != 0).collect();
         let first: Vec<u32> = (0..4000).filter(|&i| positions[i as usize].x < 90.0).collect();
-        let stages = stages(&positions, &touch, &first);
+        let stages = stages(&positions, &touch, &first, 0);
         let mut all: Vec<u32> = stages.iter().flatten().copied().collect();
         all.sort_unstable();
         assert_eq!(all, touch);
@@ -74,7 +74,7 @@ mod tests {
     #[test]
     fn a_region_that_holds_nothing_or_everything_is_one_stage() {
         let positions = vec![DVec3::ZERO; 5];
-        assert_eq!(stages(&positions, &[1, 3, 4], &[]), [[1, 3, 4]]);
-        assert_eq!(stages(&positions, &[1, 3, 4], &[0, 1, 3, 4]), [[1, 3, 4]]);
+        assert_eq!(stages(&positions, &[1, 3, 4], &[], 0), [[1, 3, 4]]);
+        assert_eq!(stages(&positions, &[1, 3, 4], &[0, 1, 3, 4], 0), [[1, 3, 4]]);
     }
 }

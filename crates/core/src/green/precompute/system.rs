@@ -1,7 +1,6 @@
 //! Solution of one block of columns, from its loads to its panel.
 
-use super::block::Block;
-use super::layout::Layout;
+use super::layout::{Block, Layout};
 use super::number::Number;
 use super::sweep::{Scratch, Sweep, loaded};
 use super::tree::Tree;
@@ -19,14 +18,14 @@ pub struct System<'a> {
 
 impl System<'_> {
     /// Solves a block into its panel: displacements of free rows, and on supported rows the reactions `K_DN u_N`, with
-    /// `K_Dj` for moved supports.
-    pub fn solve<C: Number, T: Number>(
+    /// `K_Dj` for moved supports. The panel's numbers, as bytes.
+    pub fn solve<'w, C: Number, T: Number>(
         &self,
         sweep: &Sweep<C>,
         block: &Block,
         scratch: &mut Scratch<C>,
-        panel: &mut Vec<T>,
-    ) {
+        panel: &'w mut Vec<T>,
+    ) -> &'w [u8] {
         let tree = &sweep.tree;
         let sources = self.layout.loads(self.stiffness, self.supports, tree, block);
         sweep.solve(scratch, &sources, &loaded(tree, block.width, &sources), &self.readers(tree, block));
@@ -42,6 +41,7 @@ impl System<'_> {
                 panel.extend(sums.iter().map(|&sum| T::from_f64(sum)));
             }
         }
+        bytemuck::cast_slice(panel)
     }
 
     /// Reaction of one supported dof in every column of a block.

@@ -123,6 +123,16 @@ impl Contact {
     }
 }
 
+/// Some slots, in order, and their number: they are read while the contacts change.
+pub(super) fn gathered(slots: impl Iterator<Item = usize>) -> ([usize; MAX_CONTACTS], usize) {
+    let (mut gathered, mut count) = ([0; MAX_CONTACTS], 0);
+    for slot in slots {
+        gathered[count] = slot;
+        count += 1;
+    }
+    (gathered, count)
+}
+
 /// Slots for contacts. The patches are stored separately, so that a pass over the slots reads little memory.
 #[derive(Clone, Debug)]
 pub struct Contacts {
@@ -176,6 +186,11 @@ impl Contacts {
     /// Slots of the contacts of a body.
     pub(super) fn on(&self, body: usize) -> impl Iterator<Item = usize> + '_ {
         self.occupied().filter(move |&slot| self.slots[slot].body == body)
+    }
+
+    /// Slots of the linear contacts of a body.
+    pub(super) fn linear_on(&self, body: usize) -> impl Iterator<Item = usize> + '_ {
+        self.on(body).filter(|&slot| !self.slots[slot].nonlinear)
     }
 
     /// Slots of the contacts of a tool with a body.

@@ -9,9 +9,9 @@ use crate::simulation::body::BodyModel;
 use crate::simulation::input::Input;
 use crate::simulation::model::Model;
 use crate::simulation::motion::Motion;
-use crate::simulation::rotation::rotation_vector;
 use crate::simulation::state::ToolState;
 use crate::simulation::tool::ToolModel;
+use crate::tensor::rotation_vector;
 
 /// Distance from the surface at rest, over the tool's radius, beyond which displacements by motion are neglected: they are smaller.
 const MOVING_REACH: f64 = 4.0;

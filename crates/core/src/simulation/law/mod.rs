@@ -19,6 +19,8 @@ pub use approach::Approach;
 pub use interface::Law;
 pub use local::LocalScratch;
 
+use super::contacts::Contact;
+use super::model::Model;
 use super::system::System;
 use super::tool::LawKind;
 use super::weight_scratch::WeightScratch;
@@ -35,6 +37,12 @@ pub const LAWS: &[&dyn Law] = &[
 /// The law of a kind.
 pub fn law_of(kind: LawKind) -> &'static dyn Law {
     LAWS.iter().copied().find(|law| law.kind() == kind).unwrap_or(LAWS[0])
+}
+
+/// Last check of a contact before its wrench leaves the tick: whether it is finite and physically possible.
+pub fn is_sound(model: &Model, contact: &Contact, stiffness_scale: f64) -> bool {
+    let finite = contact.force.is_finite() && contact.torque.is_finite() && contact.point.is_finite();
+    finite && law_of(contact.law).is_sound(model, contact, stiffness_scale)
 }
 
 impl LawKind {

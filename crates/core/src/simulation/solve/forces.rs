@@ -4,9 +4,8 @@ use glam::{DMat3, DVec3};
 
 use crate::contact::smallest_eigenvalue;
 use crate::contact::smooth::FanWeights;
-use crate::simulation::MAX_CONTACTS;
 use crate::simulation::body::BodyDynamics;
-use crate::simulation::contacts::Contact;
+use crate::simulation::contacts::{Contact, gathered};
 use crate::simulation::model::Model;
 use crate::simulation::state::State;
 use crate::simulation::system::System;
@@ -16,8 +15,7 @@ use crate::simulation::tool::ToolModel;
 /// motion, `C` the static compliance or that of one step, and `s` what is in series with it.
 pub fn contact_forces(model: &Model, state: &mut State, system: &mut System, body: usize) {
     let moving = state.bodies[body].motion.as_ref();
-    let mut slots = [0; MAX_CONTACTS];
-    let count = linear_slots(state, body, &mut slots);
+    let (slots, count) = gathered(state.contacts.linear_on(body));
     solve_with(
         model,
         state,
@@ -88,16 +86,6 @@ pub fn contact_displacement_at(model: &Model, state: &State, body: usize, weight
         }
     }
     dent / state.bodies[body].stiffness_scale
-}
-
-/// Slots of the linear contacts of a body, in order; returns their number.
-pub fn linear_slots(state: &State, body: usize, slots: &mut [usize; MAX_CONTACTS]) -> usize {
-    let mut count = 0;
-    for slot in state.contacts.on(body).filter(|&slot| !state.contacts.slots[slot].nonlinear) {
-        slots[count] = slot;
-        count += 1;
-    }
-    count
 }
 
 /// Assembles and solves for some contacts of one body; `system.right` has the forces afterwards.

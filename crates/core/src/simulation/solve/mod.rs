@@ -4,6 +4,4 @@ mod compliance;
 mod forces;
 
 pub use compliance::add_contact;
-pub use forces::{
-    contact_displacement, contact_displacement_at, contact_forces, linear_slots, own_compliance, solve_with,
-};
+pub use forces::{contact_displacement, contact_displacement_at, contact_forces, own_compliance, solve_with};

@@ -22,6 +22,7 @@ const OFFSETS: usize = 2 * MAX_CELLS;
 
 /// A number for each cell, row by row.
 pub type Grid = [[f64; MAX_CELLS]; MAX_CELLS];
+pub const ZERO: Grid = [[0.0; MAX_CELLS]; MAX_CELLS];
 
 /// `T` or a derivative of it by distance of rows and offset of columns plus 15.
 pub type Kernel = [[f64; OFFSETS]; MAX_CELLS];
@@ -60,7 +61,7 @@ impl Influence {
         }
         (self.cells, self.aspect) = (cells, aspect);
         // Values and derivatives by y of F at the corners (i + 1/2, aspect (j + 1/2)).
-        let (mut value, mut by_y) = ([[0.0; MAX_CELLS]; MAX_CELLS], [[0.0; MAX_CELLS]; MAX_CELLS]);
+        let (mut value, mut by_y) = (ZERO, ZERO);
         for j in 0..self.cells {
             let y = aspect * (j as f64 + 0.5);
             for i in 0..self.cells {

@@ -21,7 +21,7 @@ use super::super::shape::ToolShape;
 use super::contact_plane::{ContactPlane, ToolPose};
 use grid::{Rectangle, ToolInSurfaceFrame};
 pub use influence::MAX_CELLS;
-use influence::{Grid, Influence};
+use influence::{Grid, Influence, ZERO};
 use pressure::PressureScratch;
 pub use pressure::{Convergence, MAX_PRODUCTS, TOLERANCE};
 pub use relief::{GridFrame, Heights, LEAST_COSINE, Relief, SurfaceEnd, Wedge};
@@ -83,9 +83,10 @@ pub struct CellPlace {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PressureState {
     resolution: Resolution,
-    place: CellPlace,
-    /// Forces up to a common factor, of the last solution.
-    forces: Grid,
+    /// Where the cells lay in the last solution.
+    pub place: CellPlace,
+    /// Normal forces of the cells in the last solution, up to a common factor: across the grid, then along it.
+    pub forces: Grid,
     /// Forces over `pi E* sqrt(hx hy)`, m.
     q: Grid,
     /// Forces of a punch on the same cells for a unit approach.
@@ -94,20 +95,7 @@ pub struct PressureState {
 
 impl Default for PressureState {
     fn default() -> Self {
-        let zero = [[0.0; MAX_CELLS]; MAX_CELLS];
-        Self { resolution: Resolution::Fine, place: CellPlace::default(), forces: zero, q: zero, punch: zero }
-    }
-}
-
-impl PressureState {
-    /// Where the cells lay in the last solution.
-    pub fn place(&self) -> &CellPlace {
-        &self.place
-    }
-
-    /// Normal forces of the cells in the last solution, up to a common factor: across the grid, then along it.
-    pub fn forces(&self) -> &[[f64; MAX_CELLS]; MAX_CELLS] {
-        &self.forces
+        Self { resolution: Resolution::Fine, place: CellPlace::default(), forces: ZERO, q: ZERO, punch: ZERO }
     }
 }
 
@@ -128,16 +116,15 @@ pub struct CellScratch {
 
 impl Default for CellScratch {
     fn default() -> Self {
-        let zero = [[0.0; MAX_CELLS]; MAX_CELLS];
         Self {
             influence: Influence::new(),
             solver: PressureScratch::new(),
             heights: Heights::default(),
-            gap: zero,
-            scaled: zero,
-            root: zero,
-            slopes: [zero; 2],
-            image: zero,
+            gap: ZERO,
+            scaled: ZERO,
+            root: ZERO,
+            slopes: [ZERO; 2],
+            image: ZERO,
         }
     }
 }

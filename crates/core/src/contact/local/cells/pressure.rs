@@ -7,7 +7,7 @@
 //! others miss (Dostal and Schoeberl, Minimizing quadratic functions subject to bound constraints, 2005). Each step lowers the
 //! energy `q.T q/2 + q.gap`.
 
-use super::influence::{Grid, Influence, MAX_CELLS};
+use super::influence::{Grid, Influence, MAX_CELLS, ZERO};
 
 /// Most products with the influence that one solution takes: a bound of its time.
 pub const MAX_PRODUCTS: usize = 40;
@@ -47,8 +47,7 @@ struct Residuals {
 impl PressureScratch {
     /// Zeros.
     pub fn new() -> Self {
-        let zero = [[0.0; MAX_CELLS]; MAX_CELLS];
-        Self { cells: MAX_CELLS, residual: zero, direction: zero, image: zero, trial: zero, trial_image: zero }
+        Self { cells: MAX_CELLS, residual: ZERO, direction: ZERO, image: ZERO, trial: ZERO, trial_image: ZERO }
     }
 
     /// Solves for `q` (m), starting from its values. Cells where `gap` (m) is not negative carry no pressure, for pressure raises

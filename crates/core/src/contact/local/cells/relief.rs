@@ -13,7 +13,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use glam::{DMat3, DVec3};
 
 use super::super::contact_plane::ContactPlane;
-use super::influence::{Grid, MAX_CELLS};
+use super::influence::{Grid, MAX_CELLS, ZERO};
 use crate::math::{acos, sin};
 use crate::mesh::is_convex;
 
@@ -170,16 +170,15 @@ struct Crease {
 impl Default for Heights {
     /// Without a surface.
     fn default() -> Self {
-        let zero = [[0.0; MAX_CELLS]; MAX_CELLS];
         Self {
             height: [[f64::NEG_INFINITY; MAX_CELLS]; MAX_CELLS],
-            slopes: [zero; 2],
-            surface_point: [zero; 3],
-            by_side: [zero; 2],
-            softening: zero,
-            softening_slopes: [zero; 2],
-            softening_turns: [zero; 2],
-            edge: [zero; 3],
+            slopes: [ZERO; 2],
+            surface_point: [ZERO; 3],
+            by_side: [ZERO; 2],
+            softening: ZERO,
+            softening_slopes: [ZERO; 2],
+            softening_turns: [ZERO; 2],
+            edge: [ZERO; 3],
             has_edge: false,
         }
     }
@@ -190,8 +189,7 @@ impl Heights {
     pub fn clear(&mut self) {
         self.height = [[f64::NEG_INFINITY; MAX_CELLS]; MAX_CELLS];
         if self.has_edge {
-            let zero = [[0.0; MAX_CELLS]; MAX_CELLS];
-            (self.softening, self.softening_slopes, self.softening_turns) = (zero, [zero; 2], [zero; 2]);
+            (self.softening, self.softening_slopes, self.softening_turns) = (ZERO, [ZERO; 2], [ZERO; 2]);
             self.has_edge = false;
         }
     }

@@ -20,13 +20,13 @@ use super::wrench::{largest_overlap, placed_shape};
 use crate::contact::Concavities;
 use crate::contact::footprint::{OtherPlanes, PlacedShape, Plane};
 use crate::contact::smooth::FootPoint;
-use crate::simulation::contacts::{Contact, Contacts, LocalContact, Mode, STRAIN_REQUESTS};
+use crate::simulation::MAX_PLACES;
+use crate::simulation::contacts::{Contact, Contacts, LocalContact, Mode, STRAIN_REQUESTS, gathered};
 use crate::simulation::law::TickMemory;
 use crate::simulation::model::Model;
 use crate::simulation::solve::contact_displacement_at;
 use crate::simulation::state::State;
 use crate::simulation::tool::LawKind;
-use crate::simulation::{MAX_CONTACTS, MAX_PLACES};
 
 /// Distance of the tool, over its radius, within which a contact is added as pending.
 const PENDING_DISTANCE: f64 = 0.4;
@@ -45,15 +45,9 @@ pub fn find_additional_contacts(
     (tool, body): (usize, usize),
 ) {
     let concavities = &model.concavities[tool][body];
-    let mut slots = [0; MAX_CONTACTS];
-    let mut count = 0;
-    for slot in state.contacts.of(tool, body) {
-        let contact = &state.contacts.slots[slot];
-        if contact.law == LawKind::LOCAL && !contact.local.is_fading {
-            slots[count] = slot;
-            count += 1;
-        }
-    }
+    let lasts = |contact: &Contact| contact.law == LawKind::LOCAL && !contact.local.is_fading;
+    let lasting = state.contacts.of(tool, body).filter(|&slot| lasts(&state.contacts.slots[slot]));
+    let (slots, count) = gathered(lasting);
     memory.weight_scratch.near.invalidate();
     for &slot in &slots[..count] {
         find_beside(model, state, &mut memory, concavities, slot);

@@ -42,8 +42,7 @@ mod tests {
     use crate::contact::Moduli;
     use crate::contact::shape::ToolShape;
     use crate::green::{Precision, precompute};
-    use crate::simulation::contact_check::is_sound;
-    use crate::simulation::law::bodies;
+    use crate::simulation::law::{bodies, is_sound};
     use crate::simulation::step::output_wrenches;
     use crate::simulation::tool::LawKind;
     use crate::simulation::{BodyModel, Input, Placement, Pose, Scratch, State, ToolInput, ToolModel, step};

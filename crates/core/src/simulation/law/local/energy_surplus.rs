@@ -7,8 +7,8 @@ use super::scratch::LocalScratch;
 use crate::simulation::contacts::{Contacts, REVISIONS};
 use crate::simulation::model::Model;
 use crate::simulation::passivity::{ContactEnergy, ObservedContact};
-use crate::simulation::rotation::rotation_vector;
 use crate::simulation::state::{BodyState, State, ToolState};
+use crate::tensor::rotation_vector;
 
 /// Energy of the contacts of a body at rest, by its passivity observer.
 pub fn observe_energy(

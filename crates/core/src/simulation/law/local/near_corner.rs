@@ -51,20 +51,16 @@ pub fn evaluate(
 ) -> Option<()> {
     // Set again with each foot.
     weights.touchable = 1.0;
+    let share = share_of_cells(body.corners, contact.is_fading, guess.foot.triangle, guess.place);
     match (body.pressed_surface, body.corners) {
         (Some(pressed), _) => {
             evaluate_shape((body, pressed), tool, contact, guess, others, cells, (weights, response))?;
         }
-        (None, Some(corners)) => {
-            let share = share_of_cells(body.corners, contact.is_fading, guess.foot.triangle, guess.place);
-            if share.0 > 0.0 {
-                let at = (body, corners, share);
-                *response = evaluate_near_corner(at, tool, contact, guess, others, weights, cells)?;
-                return Some(());
-            }
-            evaluate_sphere(body, tool, contact, guess, others, ([weights, cells.corner_weights], response))?;
+        (None, Some(corners)) if share.0 > 0.0 => {
+            let at = (body, corners, share);
+            *response = evaluate_near_corner(at, tool, contact, guess, others, weights, cells)?;
         }
-        (None, None) => {
+        (None, _) => {
             evaluate_sphere(body, tool, contact, guess, others, ([weights, cells.corner_weights], response))?;
         }
     }
@@ -72,7 +68,7 @@ pub fn evaluate(
     Some(())
 }
 
-/// Evaluates the response of a sphere of which a share is on cells. `None` where the body is not touchable.
+/// The response of a sphere of which a share is on cells, without its force. `None` where the body is not touchable.
 fn evaluate_near_corner(
     (body, corners, (share, gradient)): (LocalBody<'_>, &CornerSurface, (f64, DVec3)),
     tool: LocalTool<'_>,
@@ -100,7 +96,6 @@ fn evaluate_near_corner(
     if share == 1.0 {
         let mut response = on_cells(weights, corner_weights)?;
         response.set_series(body, weights, guess, 0.0);
-        response.find_force(tool, contact, guess.place, others);
         return Some(response);
     }
     let mut sphere = LocalResponse::default();
@@ -113,7 +108,6 @@ fn evaluate_near_corner(
     let mut response = sphere.mixed(&on_cells, (share, gradient), guess.force);
     weights.mix(corner_weights, share, gradient);
     response.set_series(body, weights, guess, (1.0 - share) * sphere.turned_part);
-    response.find_force(tool, contact, guess.place, others);
     Some(response)
 }
 

@@ -31,7 +31,7 @@ use crate::contact::local::cells::Resolution;
 use crate::contact::regular::{WIDTH, blend_fields};
 use crate::contact::{Refusal, patch_weights};
 use crate::simulation::MAX_CONTACTS;
-use crate::simulation::contacts::{Contact, Mode};
+use crate::simulation::contacts::{Contact, Mode, gathered};
 use crate::simulation::input::Controls;
 use crate::simulation::law::TickMemory;
 use crate::simulation::model::Model;
@@ -97,12 +97,8 @@ pub fn local_forces(model: &Model, state: &mut State, mut memory: TickMemory<'_>
     memory.local.pressed_slot = None;
     memory.local.footprint.near.invalidate();
     loop {
-        let mut slots = [0; MAX_CONTACTS];
-        let mut count = 0;
-        for slot in state.contacts.on(body).filter(|&slot| state.contacts.slots[slot].law == LawKind::LOCAL) {
-            slots[count] = slot;
-            count += 1;
-        }
+        let is_local = |&slot: &usize| state.contacts.slots[slot].law == LawKind::LOCAL;
+        let (slots, count) = gathered(state.contacts.on(body).filter(is_local));
         let slots = &slots[..count];
         if count == 0 {
             return state.bodies[body].passivity.reset();
