@@ -51,9 +51,8 @@ const MOST_BY_TURN: f64 = 1.0;
 const BLADE: f64 = 1.5;
 /// `w` over the sphere's radius.
 const SLOWED: f64 = 0.3;
-/// Edges up to this distance from a triangle, over the radius, are listed for it; and up to the second one for centres inside a body: the
-/// band between two faces reaches so far three radii deep.
-const LISTED: [f64; 2] = [1.0, 5.0];
+/// Edges up to this distance from a triangle, over the radius, are listed for it.
+const LISTED: f64 = 1.0;
 /// Cosine of the angle between two edges that meet, from which they are pieces of one.
 const SAME_CHAIN: f64 = 0.7;
 /// Cosines between the normal of a foot and that of a face of an edge from which the edge counts, and counts fully.
@@ -72,32 +71,29 @@ const ON_EDGE: f64 = 1e-6;
 
 /// A piece of a sharp convex edge.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Edge {
-    pub(super) ends: [DVec3; 2],
-    pub(super) along: DVec3,
+struct Edge {
+    ends: [DVec3; 2],
+    along: DVec3,
     /// Unit vectors from the edge into both faces, and the normals of these.
     into: [DVec3; 2],
-    pub(super) normals: [DVec3; 2],
-    /// Their drawn triangles.
-    pub(super) triangles: [u32; 2],
+    normals: [DVec3; 2],
     /// `m (1 - L)`.
     deficit: f64,
     /// Number of the edge; all its pieces have the same.
     chain: u32,
     /// Whether the edge ends with each end of this piece.
-    pub(super) is_last: [bool; 2],
+    is_last: [bool; 2],
 }
 
 /// Sharp convex edges of a surface, for a sphere.
 pub struct ConvexEdges {
-    pub(super) edges: Vec<Edge>,
+    edges: Vec<Edge>,
     corners: Vec<ConvexCorner>,
     /// Those near each drawn triangle.
     near_corners: TriangleLists,
-    /// Those near each drawn triangle, and near a centre inside the body; pieces of one edge follow each other.
+    /// Those near each drawn triangle; pieces of one edge follow each other.
     near: TriangleLists,
-    pub(super) around_inside: TriangleLists,
-    pub(super) radius: f64,
+    radius: f64,
 }
 
 /// A sphere beside sharp edges.
@@ -145,7 +141,7 @@ impl BesideEdges {
 
 impl Edge {
     /// Squared distance of a point, m^2.
-    pub(super) fn distance_squared(&self, point: DVec3) -> f64 {
+    fn distance_squared(&self, point: DVec3) -> f64 {
         let length = self.ends[0].distance(self.ends[1]);
         let at = (point - self.ends[0]).dot(self.along).clamp(0.0, length);
         point.distance_squared(self.ends[0] + self.along * at)
@@ -247,8 +243,11 @@ impl ConvexEdges {
         if edges.is_empty() {
             return None;
         }
-        let boxes = |reach: f64| edges.iter().map(move |edge| edge.box_around(reach * radius));
-        let [near, around_inside] = LISTED.map(|reach| TriangleLists::new(surface, query, boxes(reach)));
+        let reach = DVec3::splat(LISTED * radius);
+        let boxes = edges
+            .iter()
+            .map(|&Edge { ends: [first, second], .. }| [first.min(second) - reach, first.max(second) + reach]);
+        let near = TriangleLists::new(surface, query, boxes);
         let ending = |at: DVec3| {
             let ends = move |edge: &&Edge| (0..2).any(|k| edge.is_last[k] && edge.ends[k] == at);
             edges.iter().filter(ends).map(|edge| edge.normals)
@@ -256,7 +255,7 @@ impl ConvexEdges {
         let corners = ConvexCorner::all(surface, smooth, ending);
         let around = corners.iter().map(|corner| corner.box_around(radius));
         let near_corners = TriangleLists::new(surface, query, around);
-        Some(Self { edges, corners, near_corners, near, around_inside, radius })
+        Some(Self { edges, corners, near_corners, near, radius })
     }
 
     /// Where a sphere with its centre and foot there is beside sharp edges; `None` elsewhere.
@@ -306,7 +305,6 @@ impl ConvexEdges {
         ranges.add(&self.edges);
         ranges.add(&self.corners);
         self.near.add_memory(ranges);
-        self.around_inside.add_memory(ranges);
         self.near_corners.add_memory(ranges);
     }
 }
@@ -315,7 +313,7 @@ impl ConvexEdges {
 fn convex_edges(surface: &Surface, smooth: &SmoothSurface) -> Vec<Edge> {
     let (mut edges, mut nodes) = (Vec::new(), Vec::new());
     for crease in smooth.convex_creases(surface) {
-        let ConvexCrease { ends, normals, triangles, .. } = crease;
+        let ConvexCrease { ends, normals, .. } = crease;
         let turn = acos(normals[0].dot(normals[1]).clamp(-1.0, 1.0)) / FRAC_PI_2;
         if turn > BLADE {
             continue;
@@ -324,7 +322,7 @@ fn convex_edges(surface: &Surface, smooth: &SmoothSurface) -> Vec<Edge> {
         let into = [normals[0].cross(along), along.cross(normals[1])];
         let by_turn = (turn * (BY_TURN[0] + BY_TURN[1] * turn)).min(MOST_BY_TURN);
         let deficit = by_turn * (1.0 - LEAST_SHARE);
-        edges.push(Edge { ends, along, into, normals, triangles, deficit, chain: u32::MAX, is_last: [true; 2] });
+        edges.push(Edge { ends, along, into, normals, deficit, chain: u32::MAX, is_last: [true; 2] });
         nodes.push(crease.nodes);
     }
     number_chains(&mut edges, &nodes);

@@ -23,7 +23,6 @@ mod tessellation;
 mod thin;
 mod touch_patch;
 mod triangle_lists;
-mod wedge;
 
 pub(crate) use closest::barycentric;
 pub use closest::{SurfacePoint, SurfaceQuery};
@@ -32,7 +31,6 @@ pub use concavities::Concavities;
 pub use convex_corners::CornerSurface;
 pub use convex_edges::{BesideEdges, ConvexEdges};
 pub use local::SeriesFields;
-pub use modulus_share::Share;
 #[cfg(feature = "offline")]
 pub use patch::wide_patch_weights;
 pub use patch::{MAX_PATCH_NODES, Patch, PatchScratch, Refusal, patch_weights};
@@ -43,7 +41,6 @@ pub use tessellation::Tessellation;
 pub use thin::{is_thin_at, thickness_for};
 pub use touch_patch::TouchPatch;
 pub(crate) use triangle_lists::TriangleLists;
-pub use wedge::{BetweenFaces, Faces};
 
 /// Maps the numbers below `count`, in their order, with some memory for each thread; without the offline part there is one thread.
 fn map_with<M, T: Send>(

@@ -4,20 +4,16 @@ use glam::{DMat3, DVec3};
 
 use crate::tensor::outer;
 
-/// A function of the sphere's centre.
+/// A function of the sphere's centre, its gradient, and its second derivatives.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Share {
-    /// The function.
     pub value: f64,
-    /// Its gradient.
     pub gradient: DVec3,
-    /// Its second derivatives.
     pub hessian: DMat3,
 }
 
 impl Share {
-    /// One everywhere.
-    pub const WHOLE: Self = Self { value: 1.0, gradient: DVec3::ZERO, hessian: DMat3::ZERO };
+    pub(super) const WHOLE: Self = Self { value: 1.0, gradient: DVec3::ZERO, hessian: DMat3::ZERO };
 
     /// The product of two functions.
     pub(super) fn times(&self, other: &Self) -> Self {
@@ -43,7 +39,7 @@ impl Share {
     }
 
     /// `factor * self + constant`.
-    pub fn scaled(&self, factor: f64, constant: f64) -> Self {
+    pub(super) fn scaled(&self, factor: f64, constant: f64) -> Self {
         Self { value: factor * self.value + constant, gradient: self.gradient * factor, hessian: self.hessian * factor }
     }
 }

@@ -35,9 +35,7 @@ pub struct ConvexCrease {
     pub nodes: [u32; 2],
     /// Their positions, m.
     pub ends: [DVec3; 2],
-    /// Drawn triangles of both faces, first of the one that it goes round counter-clockwise.
-    pub triangles: [u32; 2],
-    /// Their normals.
+    /// Normals of both faces, first of the one that it goes round counter-clockwise.
     pub normals: [DVec3; 2],
 }
 
@@ -130,7 +128,6 @@ impl SmoothSurface {
                 let crease = ConvexCrease {
                     nodes: [nodes[k], nodes[next]],
                     ends: [ends[k], ends[next]],
-                    triangles: [t as u32, across[k]],
                     normals: [t, across[k] as usize].map(|t| surface.normals[t]),
                 };
                 let [first, second] = crease.normals;

@@ -60,9 +60,7 @@ pub fn evaluate(
             let at = (body, corners, share);
             *response = evaluate_near_corner(at, tool, contact, guess, others, weights, cells)?;
         }
-        (None, _) => {
-            evaluate_sphere(body, tool, contact, guess, others, ([weights, cells.corner_weights], response))?;
-        }
+        (None, _) => evaluate_sphere(body, tool, contact, guess, others, (weights, response))?,
     }
     response.find_force(tool, contact, guess.place, others);
     Some(())
@@ -99,7 +97,7 @@ fn evaluate_near_corner(
         return Some(response);
     }
     let mut sphere = LocalResponse::default();
-    evaluate_sphere(body, tool, contact, guess, others, ([&mut *weights, &mut *corner_weights], &mut sphere))?;
+    evaluate_sphere(body, tool, contact, guess, others, (weights, &mut sphere))?;
     corner_weights.touchable = 1.0;
     let Some(on_cells) = on_cells(corner_weights, weights) else {
         weights.touchable = corner_weights.touchable;
@@ -107,7 +105,7 @@ fn evaluate_near_corner(
     };
     let mut response = sphere.mixed(&on_cells, (share, gradient), guess.force);
     weights.mix(corner_weights, share, gradient);
-    response.set_series(body, weights, guess, (1.0 - share) * sphere.turned_part);
+    response.set_series(body, weights, guess, 1.0 - share);
     Some(response)
 }
 

@@ -68,7 +68,7 @@ pub struct LocalResponse {
     higher_at_guess: HigherOrders,
     series: Option<Blended<SERIES_FIELDS>>,
     /// Part to which these turn the contact (`turned_push`).
-    pub(super) turned_part: f64,
+    turned_part: f64,
     /// Part of the place where they are known.
     pub known: f64,
     scale: f64,
@@ -114,22 +114,19 @@ pub(super) fn evaluate_sphere(
     contact: &LocalContact,
     guess: Guess<'_>,
     others: OtherContacts,
-    ([weights, other_weights], response): ([&mut FanWeights; 2], &mut LocalResponse),
+    (weights, response): (&mut FanWeights, &mut LocalResponse),
 ) -> Option<()> {
     let mut foot = match contact.is_fading {
         true => contact.foot.frozen(guess.place),
         false => body.smooth.foot(body.drawn, guess.place - guess.offset, guess.foot, &mut weights.near)?,
     };
     let near_edge = match contact.is_fading {
-        true => {
-            body.smooth.weigh(&foot, weights);
-            None
-        }
-        false => {
-            let at = (&mut foot, guess.place - guess.offset);
-            NearEdge::find(body, at, guess.force, [&mut *weights, other_weights])
-        }
+        true => None,
+        false => NearEdge::find(body, (&foot, guess.place - guess.offset), guess.force, weights),
     };
+    if near_edge.is_none() {
+        body.smooth.weigh(&foot, weights);
+    }
     if weights.is_outside() {
         return None;
     }
@@ -146,17 +143,13 @@ pub(super) fn evaluate_sphere(
         near_edge.soften(&mut fields);
     }
     // A new contact has no force: its approach counts from the present depth.
-    let mut indentation = match contact.is_new {
+    let indentation = match contact.is_new {
         true => Indentation::default(),
         false => indent(body, tool, contact, (&foot, distance), &fields),
     };
-    if let Some(near_edge) = &near_edge {
-        near_edge.along_normal(&mut indentation, foot.normal);
-    }
     *response = LocalResponse::at(body, foot, &fields, indentation);
     response.slope = slope(body, guess.force, others, &fields);
     if let Some(near_edge) = &near_edge {
-        response.turned_part = near_edge.turned_part;
         response.bending = near_edge.bending(&response.indentation, response.foot.normal);
     }
     response.slope_by_force = compliance_slope(body, guess.force, &fields);

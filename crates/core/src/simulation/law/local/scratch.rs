@@ -84,7 +84,6 @@ impl LocalScratch {
         if self.body != Some(body) {
             self.body = Some(body);
             self.weights.iter_mut().for_each(|weights| weights.near.invalidate());
-            self.corner_weights.near.invalidate();
         }
     }
 
