@@ -71,15 +71,12 @@ fn has_rounded_edge(model: &Model, contact: &Contact, foot: &FootPoint) -> bool 
 
 /// Whether a foot has moved much farther than its tool, or to another side.
 pub fn foot_has_jumped(model: &Model, contact: &Contact, response: &LocalResponse, place: DVec3) -> bool {
-    if !foot_is_followed(model, contact) {
-        return false;
-    }
     let (local, tool) = (&contact.local, &model.tools[contact.tool]);
     let travel = place.distance(local.relative_position);
     let has_jumped = response.foot.position.distance(local.foot.position)
         > JUMP_RATIO * travel + JUMP_DISTANCE * tool.radius
         || response.foot.normal.dot(local.foot.normal) < SAME_SIDE;
-    has_jumped && !has_rounded_edge(model, contact, &response.foot)
+    has_jumped && foot_is_followed(model, contact) && !has_rounded_edge(model, contact, &response.foot)
 }
 
 /// Starts the fading of contacts whose feet have jumped, and begins their replacements. Returns whether there were any.
@@ -168,11 +165,9 @@ pub fn fix_snapping_contacts(model: &Model, state: &mut State, solved: SolvedCon
     for (a, &slot) in slots.iter().enumerate() {
         let contact = &state.contacts.slots[slot];
         let (local, tool) = (&contact.local, &model.tools[contact.tool]);
-        if local.force == DVec3::ZERO || !foot_is_followed(model, contact) {
-            continue;
-        }
         let snap = solved.positions[a].distance(local.relative_position) - local.way.length();
-        if snap > LONGEST_SNAP * tool.radius && !has_rounded_edge(model, contact, &solved.responses[a].foot) {
+        let is_long = snap > LONGEST_SNAP * tool.radius && local.force != DVec3::ZERO;
+        if is_long && foot_is_followed(model, contact) && !has_rounded_edge(model, contact, &solved.responses[a].foot) {
             fix_on_plane(tool, &mut state.contacts.slots[slot], 0.0);
             any = true;
         }

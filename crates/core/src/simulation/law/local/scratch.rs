@@ -7,7 +7,7 @@ use super::inclination::OtherContacts;
 use super::response::LocalResponse;
 use super::secant::Secant;
 use crate::contact::footprint::FootprintScratch;
-use crate::contact::local::cells::{CellScratch, PressureState};
+use crate::contact::local::cells::{CellScratch, PressureState, Resolution};
 use crate::contact::smooth::{FanWeights, FootPoint, SmoothSurface};
 use crate::math::pow;
 use crate::simulation::MAX_CONTACTS;
@@ -62,6 +62,8 @@ pub struct LocalScratch {
     /// Steps of Newton's method for the latest body.
     pub newton_steps: usize,
     pub(super) cells: Box<CellScratch>,
+    /// Resolution of cells; none where no contact of the body needs them.
+    pub(super) cell_resolution: Option<Resolution>,
     /// The pieces next to the latest tool, and the slot of its contact.
     pub footprint: FootprintScratch,
     pub pressed_slot: Option<usize>,
@@ -233,6 +235,7 @@ impl LocalScratch {
             force_change: 0.0,
             newton_steps: 0,
             cells: Box::default(),
+            cell_resolution: None,
             footprint: FootprintScratch::default(),
             pressed_slot: None,
             corner_weights: FanWeights::new(neighbourhood(model)),

@@ -164,6 +164,7 @@ fn solve_equations(
             FrictionResponse { force: contact.local.friction.force(), ..FrictionResponse::default() };
     }
     let cells = slots.iter().any(|&slot| contact_needs_cells(model, &state.contacts.slots[slot]));
+    local.cell_resolution = cells.then(|| resolution(model, state));
     let [step_factor, force_factor] = if cells { CELL_TOLERANCES } else { [1.0; 2] };
     let tool = &model.tools[state.contacts.slots[slots[0]].tool];
     let radius = if cells { tool.shape.thickness() } else { tool.radius };
@@ -313,10 +314,9 @@ fn evaluate_contacts(
     controls: &Controls,
     step: usize,
 ) -> bool {
-    let resolution = resolution(model, state);
     for (a, &slot) in slots.iter().enumerate() {
         local.guessed[a] = local.responses[a].force;
-        if contact_needs_cells(model, &state.contacts.slots[slot]) {
+        if local.cell_resolution.is_some() && contact_needs_cells(model, &state.contacts.slots[slot]) {
             local.footprint.others = other_planes(&state.contacts, slot);
         }
         let tool = state.contacts.slots[slot].tool;
@@ -330,10 +330,12 @@ fn evaluate_contacts(
                 footprint,
                 no_pressures,
                 corner_weights,
+                cell_resolution,
                 ..
             } = &mut *local;
             let contact = &state.contacts.slots[slot].local;
             let pressures = state.pressures.get_mut(slot).unwrap_or(no_pressures);
+            let resolution = cell_resolution.unwrap_or_default();
             let cells = CellMemory { state: pressures, scratch: cells, footprint, resolution, corner_weights };
             let tool = local_tool(model, controls, tool);
             let LocalResponse { force, foot, offset, friction, .. } = responses[a];
