@@ -66,7 +66,7 @@ pub fn evaluate(
     Some(())
 }
 
-/// The response of a sphere of which a share is on cells, without its force. `None` where the body is not touchable.
+/// The response of a sphere that is partly on cells; its force is found afterwards. `None` where the body is not touchable.
 fn evaluate_near_corner(
     (body, corners, (share, gradient)): (LocalBody<'_>, &CornerSurface, (f64, DVec3)),
     tool: LocalTool<'_>,

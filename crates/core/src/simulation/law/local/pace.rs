@@ -22,24 +22,26 @@ const DIVERGED_STEP: f64 = 2e-3;
 const EDGE_STEP: f64 = 2e-2;
 
 /// The pace of one solution.
+#[derive(Default)]
 pub struct Pace {
     /// Whether there are pressure cells, whose steps are bounded by their residuals instead.
     pub cells: bool,
     /// Radius of the tool, or thickness of one with pressure cells, m.
     pub radius: f64,
-    /// Whether steps have gone to and fro, so that secant corrections are on.
-    narrows: bool,
+    pub secant: Secant,
     snaps: bool,
 }
 
 impl Pace {
-    pub fn new(cells: bool, radius: f64) -> Self {
-        Self { cells, radius, narrows: false, snaps: false }
+    /// Begins a solution for so many contacts.
+    pub fn begin(&mut self, cells: bool, radius: f64, contacts: usize) {
+        (self.cells, self.radius, self.snaps) = (cells, radius, false);
+        self.secant.begin(contacts);
     }
 
     /// Most steps, and those after which they are shortened.
     fn steps(&self) -> [usize; 2] {
-        match (self.snaps, self.narrows, self.cells) {
+        match (self.snaps, self.secant.is_on, self.cells) {
             (true, _, _) => SNAP_STEPS,
             (_, true, _) => SECANT_STEPS,
             (.., true) => [MOST_CELL_STEPS, USUAL_STEPS[1]],
@@ -55,24 +57,16 @@ impl Pace {
     ///
     /// With higher orders of the body's displacement nothing is learned from residuals: their slope follows the force too slowly, so
     /// that the residual at a position depends on the steps before.
-    pub fn observe(
-        &mut self,
-        step: usize,
-        unstable: bool,
-        whole: &[DVec3],
-        responses: &[LocalResponse],
-        secant: &mut Secant,
-    ) {
+    pub fn observe(&mut self, step: usize, whole: &[DVec3], unstable: bool, responses: &[LocalResponse]) {
         self.snaps |= unstable;
         if !self.cells && !responses.iter().any(LocalResponse::has_higher_orders) {
-            secant.compare(step, whole);
-            self.narrows = secant.is_on;
+            self.secant.compare(step, whole);
         }
     }
 
     /// Share of the whole steps that is taken. The longest of them, m, becomes no longer than `bound`, m.
     pub fn share(&self, step: usize, longest: f64, bound: f64) -> f64 {
-        let (narrows, usual) = (self.narrows && !self.snaps, self.steps()[1]);
+        let (narrows, usual) = (self.secant.is_on && !self.snaps, self.steps()[1]);
         let bound = bound.min(if narrows { LONGEST_SECANT_STEP } else { LONGEST_STEP } * self.radius);
         let shortened = match step < usual {
             true => 1.0,
@@ -84,7 +78,7 @@ impl Pace {
 
     /// Whether the method has diverged, by the longest of its last whole steps, m.
     pub fn has_diverged(&self, longest: f64) -> bool {
-        let allowed = if self.narrows { EDGE_STEP } else { DIVERGED_STEP };
+        let allowed = if self.secant.is_on { EDGE_STEP } else { DIVERGED_STEP };
         !self.cells && longest > allowed * self.radius
     }
 }

@@ -18,8 +18,7 @@ use crate::contact::shape::ToolShape;
 use crate::contact::smooth::{Blended, FanWeights, FootPoint};
 use crate::math::hypot;
 use crate::simulation::contacts::LocalContact;
-use crate::tensor::rotation_vector;
-use crate::tensor::{across, outer};
+use crate::tensor::{across, outer, rotation_vector};
 
 /// Least `(1/R + kappa_1) (1/R + kappa_2)` over `1/R^2`: a concavity that fits the tool more closely counts as flatter.
 const LEAST_CURVATURE_PRODUCT: f64 = 0.1;

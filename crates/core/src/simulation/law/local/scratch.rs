@@ -4,8 +4,8 @@ use glam::{DMat3, DVec3};
 
 use super::half_space::LocalBody;
 use super::inclination::OtherContacts;
+use super::pace::Pace;
 use super::response::LocalResponse;
-use super::secant::Secant;
 use crate::contact::footprint::FootprintScratch;
 use crate::contact::local::cells::{CellScratch, PressureState, Resolution};
 use crate::contact::smooth::{FanWeights, FootPoint, SmoothSurface};
@@ -52,7 +52,7 @@ pub struct LocalScratch {
     /// Forces from which responses are evaluated, N, and the derivatives of these by the positions, N/m.
     pub(super) guessed: [DVec3; MAX_CONTACTS],
     pub(super) jacobians: [DMat3; MAX_CONTACTS],
-    pub(super) secant: Secant,
+    pub(super) pace: Pace,
     /// The positions and responses with the least residual so far, for tools with pressure cells.
     best: Vec<(DVec3, LocalResponse)>,
     /// Whether there is one.
@@ -229,7 +229,7 @@ impl LocalScratch {
             steps: [DVec3::ZERO; MAX_CONTACTS],
             guessed: [DVec3::ZERO; MAX_CONTACTS],
             jacobians: [DMat3::ZERO; MAX_CONTACTS],
-            secant: Secant::default(),
+            pace: Pace::default(),
             best: vec![(DVec3::ZERO, LocalResponse::default()); MAX_CONTACTS],
             has_best: false,
             force_change: 0.0,

@@ -20,7 +20,7 @@ use super::force_error::{ForceError, estimate};
 use super::half_space::LocalTool;
 use super::inclination::OtherContacts;
 use super::near_corner::{contact_needs_cells, evaluate};
-use super::pace::{MOST_CELL_STEPS, Pace};
+use super::pace::MOST_CELL_STEPS;
 use super::response::{Guess, LocalResponse};
 use super::scratch::{LocalScratch, TrustRegion, local_body};
 use super::snap::{SNAP_STEPS, stable_jacobian};
@@ -170,8 +170,7 @@ fn solve_equations(
     let radius = if cells { tool.shape.thickness() } else { tool.radius };
     let mut trust = TrustRegion::default();
     local.has_best = false;
-    local.secant.begin(slots.len());
-    let mut pace = Pace::new(cells, radius);
+    local.pace.begin(cells, radius, slots.len());
     for step in 0..SNAP_STEPS[0] {
         if cells && step == MOST_CELL_STEPS {
             break;
@@ -194,15 +193,15 @@ fn solve_equations(
                 continue;
             }
         }
-        let (longest, unstable) = newton_step(local, system, slots.len(), cells);
+        let (longest, unstable) = newton_step(local, system, slots.len());
         let (whole, responses) = (&local.steps[..slots.len()], &local.responses[..slots.len()]);
-        pace.observe(step, unstable, whole, responses, &mut local.secant);
+        local.pace.observe(step, whole, unstable, responses);
         let longest = if cells { local.lengthen_by_power_law(slots.len()) } else { longest };
-        let share = pace.share(step, longest, trust.longest_step);
+        let share = local.pace.share(step, longest, trust.longest_step);
         if share < 1.0 {
             local.steps[..slots.len()].iter_mut().for_each(|step| *step *= share);
         }
-        local.secant.take(&local.steps[..slots.len()], share);
+        local.pace.secant.take(&local.steps[..slots.len()], share);
         // The coupling of contacts is known after the first step.
         let is_coupled = step > 0 || slots.len() == 1;
         if is_coupled
@@ -211,9 +210,9 @@ fn solve_equations(
         {
             break;
         }
-        if step + 1 < pace.most_steps() {
+        if step + 1 < local.pace.most_steps() {
             local.take_step(slots.len());
-        } else if pace.has_diverged(longest) {
+        } else if local.pace.has_diverged(longest) {
             return Outcome::Diverged;
         } else {
             break;
@@ -380,11 +379,11 @@ fn evaluate_contacts(
 
 /// One step of Newton's method; returns the longest over the contacts, m, and whether one of them is unstable. Steps with pressure
 /// cells are bounded by their residuals instead.
-fn newton_step(local: &mut LocalScratch, system: &mut System, count: usize, cells: bool) -> (f64, bool) {
+fn newton_step(local: &mut LocalScratch, system: &mut System, count: usize) -> (f64, bool) {
     let mut unstable = false;
     for a in 0..count {
         let mut jacobian = local.responses[a].jacobian;
-        if !cells {
+        if !local.pace.cells {
             let is_unstable;
             (jacobian, is_unstable) = stable_jacobian(jacobian, &local.between[a][a]);
             unstable |= is_unstable;
@@ -410,7 +409,7 @@ fn newton_step(local: &mut LocalScratch, system: &mut System, count: usize, cell
             }
         }
         system.right[3 * a..3 * a + 3].copy_from_slice(&(-residual).to_array());
-        let Some(correction) = local.secant.correction(a, residual) else { continue };
+        let Some(correction) = local.pace.secant.correction(a, residual) else { continue };
         for row in 0..3 {
             for column in 0..3 {
                 system.matrix[3 * a + row][3 * a + column] += correction.col(column)[row];
