@@ -260,7 +260,11 @@ impl ConvexEdges {
 
     /// Where a sphere with its centre and foot there is beside sharp edges; `None` elsewhere.
     pub fn beside(&self, foot: &FootPoint, centre: DVec3) -> Option<BesideEdges> {
-        let (mut near, mut found) = (self.near.at(foot.triangle), None);
+        let (mut near, corners) = (self.near.at(foot.triangle), self.near_corners.at(foot.triangle));
+        if near.is_empty() && corners.is_empty() {
+            return None;
+        }
+        let mut found = None;
         while let Some(&first) = near.first() {
             let chain = self.edges[first as usize].chain;
             let count = near.iter().take_while(|&&edge| self.edges[edge as usize].chain == chain).count();
@@ -280,7 +284,7 @@ impl ConvexEdges {
             beside.share = beside.share.times(&edge.share(&across, self.radius));
             edge.slow(&across, SLOWED * self.radius, beside);
         }
-        for &corner in self.near_corners.at(foot.triangle) {
+        for &corner in corners {
             if let Some(share) = self.corners[corner as usize].share(centre, self.radius) {
                 let beside = found.get_or_insert_with(|| BesideEdges::at(foot));
                 beside.share = beside.share.times(&share);
@@ -461,11 +465,8 @@ mod tests {
                     let slope = (ahead.share.value - behind.share.value) / (2.0 * h);
                     assert!((slope - at.share.gradient.dot(axis)).abs() < 1e-3 / radius, "{centre}");
                     let moved = (ahead.slowed.position - behind.slowed.position) / (2.0 * h);
-                    assert!(
-                        (moved - at.slowed.shift * axis).length() < 1e-3,
-                        "{centre} {moved} {}",
-                        at.slowed.shift * axis
-                    );
+                    let shift = at.slowed.shift * axis;
+                    assert!((moved - shift).length() < 1e-3, "{centre} {moved} {shift}");
                 }
                 if let Some(before) = before {
                     assert!(before.share.gradient.distance(at.share.gradient) < 0.3 / radius, "{centre}");

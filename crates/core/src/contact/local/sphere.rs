@@ -28,9 +28,10 @@ const SERIES_UP_TO: f64 = 0.36;
 const TERMS: usize = 34;
 const FEW_TERMS: usize = 16;
 const FEW_UP_TO: f64 = 0.1;
-/// Relative length of the last step of Newton's method for the contact radius, whose square is the error that is left; and most steps.
-/// Three are usual.
+/// Relative length of the last step for the contact radius, whose square is the error that is left by Newton's method, and whose cube
+/// that by Halley's; and most steps.
 const SETTLED: f64 = 1e-8;
+const SETTLED_BY_HALLEY: f64 = 1e-5;
 const MOST_STEPS: usize = 12;
 /// Terms of the dilogarithm's series in `exp(-2 t)`, which is at most 1/4 there.
 const DILOGARITHM_TERMS: usize = 34;
@@ -138,14 +139,34 @@ const COEFFICIENTS: [[f64; TERMS]; 4] = {
     c
 };
 
-/// A contact of `x < 3/5`, from a larger `y`.
+/// Terms of the gap from `y^3` to `y^8`, over `y^3`, and of its derivative, over `y^2`.
+const GAP: [[f64; 2]; 6] = {
+    let mut terms = [[0.0; 2]; 6];
+    let mut i = 0;
+    while i < terms.len() {
+        let n = (i + 3) as f64;
+        terms[i] = [1.0 / (2.0 * n - 1.0), n / (2.0 * n - 1.0)];
+        i += 1;
+    }
+    terms
+};
+
+/// A contact of `x < 3/5`, from a larger `y`: a step of Newton's method with the next terms of the gap, then Halley's method.
 fn shallow(depth: f64, k: f64, start: f64) -> Unit {
-    let mut x = start.sqrt();
+    let y = start;
+    let (mut rest, mut slope) = (0.0, 0.0);
+    for [term, by_y] in GAP.iter().rev() {
+        (rest, slope) = (rest * y + term, slope * y + by_y);
+    }
+    let mut x = (y - rest * y * y * y / (1.0 + k + y * (2.0 / 3.0 + slope * y))).sqrt();
     for _ in 0..MOST_STEPS {
-        let t = atanh(x);
-        let change = (x * (t + k * x) - depth) / (t + x / (1.0 - x * x) + 2.0 * k * x);
+        let (t, inverse) = (atanh(x), 1.0 / (1.0 - x * x));
+        let residual = x * (t + k * x) - depth;
+        let slope = t + x * inverse + 2.0 * k * x;
+        let bend = inverse * inverse + k;
+        let change = residual / (slope - residual * bend / slope);
         x -= change;
-        if change.abs() <= SETTLED * x {
+        if change.abs() <= SETTLED_BY_HALLEY * x {
             break;
         }
     }

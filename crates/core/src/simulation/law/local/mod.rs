@@ -27,6 +27,7 @@ mod half_space;
 mod inclination;
 mod near_corner;
 mod near_edge;
+mod newton;
 mod pace;
 mod response;
 mod scratch;

@@ -80,8 +80,9 @@ pub struct LocalResponse {
     slope_by_force: DMat3,
     offset_by_force: DMat3,
     turning: DMat3,
-    /// Where the slope is known.
+    /// Where the slope is known, and whether all of it follows the force from there.
     guess: ForceGuess,
+    pub slope_follows: bool,
     /// Torque on the tool about its tip, N m.
     pub torque: DVec3,
 }
@@ -336,6 +337,7 @@ impl LocalResponse {
         let slope = whole.clamp_length_max(STEEPEST_INCLINATION * indentation.force);
         // Higher orders have their own in `turned_push`; a slope at its bound has none.
         let follows = self.series.is_none() && slope == whole && self.slope_by_force != DMat3::ZERO;
+        self.slope_follows = follows && others.slope == DVec3::ZERO && others.motion_slope.is_none();
         let by_guess = if follows { (DMat3::IDENTITY + self.slope_by_force).inverse() } else { DMat3::IDENTITY };
         let part = if self.series.is_some() { self.turned_part } else { 0.0 };
         let mut push = slope - indentation.gradient;
@@ -376,7 +378,7 @@ impl LocalResponse {
             self.jacobian = (DMat3::IDENTITY * (1.0 - part) + self.turning * part) * self.jacobian;
             self.offset_by_position = self.offset_by_force * self.jacobian;
         }
-        let share = if whole == DVec3::ZERO { 1.0 } else { slope.length() / whole.length() };
+        let share = if slope == whole { 1.0 } else { slope.length() / whole.length() };
         self.torque = indentation.torque - lever.cross(self.friction.force) + (self.turn + others.turn) * share;
     }
 

@@ -104,7 +104,7 @@ impl LocalScratch {
     /// positions with updated Jacobians. Returns whether another step follows: not after the last, nor after one that is not
     /// finite.
     pub(super) fn accept_step(&mut self, count: usize, last: bool, trust: &mut TrustRegion) -> bool {
-        let residual = self.residual(count);
+        let residual = self.largest_residual(count);
         // Where nothing touches there is no Jacobian to return with, so that a first touch is always accepted, but for the last
         // step.
         let newly_touching = !last && self.newly_touching(count);
@@ -122,14 +122,16 @@ impl LocalScratch {
         true
     }
 
-    /// Largest residual of the equation at the present positions, m.
-    fn residual(&self, count: usize) -> f64 {
-        let of = |a: usize| {
-            let moved: DVec3 = (0..count).map(|b| self.between[a][b] * self.responses[b].force).sum();
-            (self.positions[a] - self.free_positions[a] + moved + self.responses[a].higher.displacement).length()
-        };
+    /// Residual of a contact's equation at the present positions, m.
+    pub(super) fn residual(&self, a: usize, count: usize) -> DVec3 {
+        let moved: DVec3 = (0..count).map(|b| self.between[a][b] * self.responses[b].force).sum();
+        self.positions[a] - self.free_positions[a] + moved + self.responses[a].higher.displacement
+    }
+
+    /// Largest of these, m.
+    fn largest_residual(&self, count: usize) -> f64 {
         (0..count)
-            .map(of)
+            .map(|a| self.residual(a, count).length())
             .fold(0.0, |most: f64, residual| if residual.is_nan() { residual } else { most.max(residual) })
     }
 

@@ -20,7 +20,9 @@ pub const SNAP_STEPS: [usize; 2] = [64, 50];
 /// `J` of a contact, raised where it is unstable, and whether it is.
 pub fn stable_jacobian(jacobian: DMat3, compliance: &DMat3) -> (DMat3, bool) {
     let symmetric = (jacobian + jacobian.transpose()) * 0.5;
-    if is_positive(&symmetric) {
+    // No eigenvalue of `C` is larger than its norm.
+    let norm = compliance.to_cols_array().iter().map(|entry| entry * entry).sum::<f64>().sqrt();
+    if is_positive(&(symmetric + DMat3::IDENTITY * ((1.0 - UNSTABLE) / norm))) {
         return (jacobian, false);
     }
     let least = smallest_eigenvalue(&symmetric);
