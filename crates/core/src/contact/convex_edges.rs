@@ -269,12 +269,10 @@ impl ConvexEdges {
             let chain = self.edges[first as usize].chain;
             let count = near.iter().take_while(|&&edge| self.edges[edge as usize].chain == chain).count();
             let pieces = near[..count].iter().map(|&edge| &self.edges[edge as usize]);
-            let nearest = pieces.min_by(|one, other| {
-                let [one, other] = [one, other].map(|edge| edge.remoteness(foot.position, centre));
-                one.total_cmp(&other)
-            });
+            let remote = pieces.map(|edge| (edge.remoteness(foot.position, centre), edge));
+            let nearest = remote.min_by(|one, other| one.0.total_cmp(&other.0));
             near = &near[count..];
-            let Some(edge) = nearest else { continue };
+            let Some((_, edge)) = nearest else { continue };
             let across = edge.across(foot, centre, self.radius);
             let beyond = across.face.is_some_and(|face| across.places[face] >= BESIDE[1] * self.radius);
             if beyond || across.part == 0.0 {

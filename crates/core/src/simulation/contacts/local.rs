@@ -19,6 +19,8 @@ pub struct LocalContact {
     pub way: DVec3,
     /// Displacement of that position in the last tick, m.
     pub last_step: DVec3,
+    /// Change of the force, N, and of the offset, m, in that step, where the body's displacement has higher orders.
+    pub last_changes: [DVec3; 2],
     /// Orientation a tick ago.
     pub previous_orientation: DQuat,
     /// Approach at which the contact began, m: the force of a tool that appears inside starts from zero.

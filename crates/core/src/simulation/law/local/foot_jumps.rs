@@ -221,7 +221,7 @@ fn begin_replacement(model: &Model, state: &mut State, before: &Contact, (respon
     move_foot(tool, &mut next, &response.foot, place);
     next.additional = true;
     let local = &mut next.local;
-    (local.relative_position, local.last_step) = (place, DVec3::ZERO);
+    (local.relative_position, local.last_step, local.last_changes) = (place, DVec3::ZERO, Default::default());
     (local.part, local.part_rate) = (LEAST_PART, 1.0 / FADE_TICKS);
     (local.friction, local.force) = Default::default();
     next.force = DVec3::ZERO;

@@ -17,6 +17,7 @@
 //! The last term inclines the force as the surface under load is inclined. Whatever forces friction adds to `dPhi/dp'`, the
 //! work of the tool less that of friction is the change of one energy: `f . dp = d(f^T C f / 2) + f_local . dp'`.
 
+mod acceleration;
 mod additional;
 mod contact_check;
 mod coupling;
@@ -292,7 +293,12 @@ impl Law for Local {
         // A position over the surface at rest moves about as far as its tool, or less. Any excess is the residual of the method,
         // below its tolerance in a tick: extrapolated, it would repeat until it exceeds the tolerance, and then be undone at once.
         if approach.motion.is_none() {
-            local.last_step = local.last_step.clamp_length_max(STEP_PER_MOTION * travel);
+            let longest = STEP_PER_MOTION * travel;
+            let length = local.last_step.length();
+            if length > longest {
+                local.last_step *= longest / length;
+                local.last_changes = local.last_changes.map(|change| change * (longest / length));
+            }
         }
         (local.tool_position, local.orientation, local.way) = (approach.position, approach.orientation, way);
         // After a jump a new contact starts from the depth stored in the tool's state.

@@ -13,8 +13,11 @@ pub fn newton_step(local: &mut LocalScratch, system: &mut System, count: usize) 
     for a in 0..count {
         let mut jacobian = local.responses[a].jacobian;
         if !local.pace.cells {
-            let is_unstable;
-            (jacobian, is_unstable) = stable_jacobian(jacobian, &local.between[a][a]);
+            let (matrix, factor) = local.responses[a].stability_matrix();
+            let (raised, is_unstable) = stable_jacobian(matrix, &local.between[a][a]);
+            if is_unstable {
+                jacobian += factor * (raised - matrix);
+            }
             unstable |= is_unstable;
         }
         local.jacobians[a] = jacobian;

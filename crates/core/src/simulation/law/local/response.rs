@@ -2,6 +2,7 @@
 
 use glam::{DMat3, DVec3};
 
+use super::acceleration::Iterate;
 use super::half_space::{Fields, HalfSpace, Indentation, LocalBody, LocalTool};
 use super::inclination::{OtherContacts, compliance_slope, slope};
 use super::near_edge::NearEdge;
@@ -80,6 +81,8 @@ pub struct LocalResponse {
     slope_by_force: DMat3,
     offset_by_force: DMat3,
     turning: DMat3,
+    /// The factor of the force's derivative by which the contact turns, and the rest without friction's change by the pressing force.
+    unturned: (DMat3, DMat3),
     /// Where the slope is known, and whether all of it follows the force from there.
     guess: ForceGuess,
     pub slope_follows: bool,
@@ -373,9 +376,11 @@ impl LocalResponse {
         self.jacobian = outer(n, n) * indentation.stiffness - turning * indentation.force + self.friction_by_position;
         self.jacobian += self.bending;
         self.jacobian = by_guess * self.jacobian;
+        let pressed = outer(self.friction.by_pressing, n) * indentation.stiffness;
+        self.unturned = (DMat3::IDENTITY * (1.0 - part) + self.turning * part, self.jacobian + pressed);
         if part > 0.0 {
             (self.offset, self.offset_by_force) = (self.offset * part, self.offset_by_force * part);
-            self.jacobian = (DMat3::IDENTITY * (1.0 - part) + self.turning * part) * self.jacobian;
+            self.jacobian = self.unturned.0 * self.jacobian;
             self.offset_by_position = self.offset_by_force * self.jacobian;
         }
         let share = if slope == whole { 1.0 } else { slope.length() / whole.length() };
@@ -426,6 +431,32 @@ impl LocalResponse {
     /// Derivative of the body's displacement by the position at constant force: the contact moves along the surface.
     pub fn displacement_by_position(&self) -> DMat3 {
         self.slope_by_force.transpose() * (DMat3::IDENTITY - self.offset_by_position) * self.turned_part
+    }
+
+    /// What the response was evaluated from, beside its position.
+    pub(super) fn guessed(&self, position: DVec3) -> Iterate {
+        [position, self.guess.force, self.guess.friction, self.guess.offset]
+    }
+
+    /// What the next response at a position is evaluated from.
+    pub(super) fn iterate(&self, position: DVec3) -> Iterate {
+        [position, self.force, self.friction.force, self.offset]
+    }
+
+    /// Extrapolates that by a share of its difference from an earlier one.
+    pub(super) fn extrapolate(&mut self, position: DVec3, before: &Iterate, share: f64) -> Iterate {
+        let now = self.iterate(position);
+        let next: Iterate = std::array::from_fn(|k| now[k] + (now[k] - before[k]) * share);
+        (self.force, self.friction.force, self.offset) = (next[1], next[2], next[3]);
+        next
+    }
+
+    /// A matrix that shows whether the contact is stable, and the factor with which a change of it changes the derivative of the
+    /// force. With higher orders the derivative itself does not: it turns, and a sliding contact's friction grows with the pressing
+    /// force, so that it is far from symmetric, and on a soft body its symmetric part seems unstable.
+    pub fn stability_matrix(&self) -> (DMat3, DMat3) {
+        let (turning, unturned) = self.unturned;
+        if self.series.is_some() { (unturned, turning) } else { (self.jacobian, DMat3::IDENTITY) }
     }
 
     /// The springs of friction; without a force none is stretched.

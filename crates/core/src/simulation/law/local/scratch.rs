@@ -2,6 +2,7 @@
 
 use glam::{DMat3, DVec3};
 
+use super::acceleration::{Acceleration, Iterate};
 use super::half_space::LocalBody;
 use super::inclination::OtherContacts;
 use super::pace::Pace;
@@ -53,6 +54,7 @@ pub struct LocalScratch {
     pub(super) guessed: [DVec3; MAX_CONTACTS],
     pub(super) jacobians: [DMat3; MAX_CONTACTS],
     pub(super) pace: Pace,
+    pub(super) acceleration: Acceleration,
     /// The positions and responses with the least residual so far, for tools with pressure cells.
     best: Vec<(DVec3, LocalResponse)>,
     /// Whether there is one.
@@ -89,14 +91,34 @@ impl LocalScratch {
         }
     }
 
-    /// Takes the step, and extrapolates forces and offsets linearly.
-    pub(super) fn take_step(&mut self, count: usize) {
+    /// Takes the step, and extrapolates forces and offsets linearly. A whole step with higher orders of a body's displacement is
+    /// accelerated.
+    pub(super) fn take_step(&mut self, count: usize, is_whole: bool) {
+        let accelerates = is_whole && self.responses[..count].iter().any(LocalResponse::has_higher_orders);
+        if !accelerates {
+            self.acceleration.reset();
+        }
+        let has_previous = accelerates && self.acceleration.begin(count);
+        let mut previous = [Iterate::default(); MAX_CONTACTS];
         for a in 0..count {
+            let before = self.responses[a].guessed(self.positions[a]);
             self.positions[a] += self.steps[a];
             let response = &mut self.responses[a];
             response.force += response.jacobian * self.steps[a];
             response.friction.force += response.friction_by_position * self.steps[a];
             response.offset += response.offset_by_position * self.steps[a];
+            if accelerates {
+                let compliance = 1.0 / response.indentation.stiffness.max(f64::MIN_POSITIVE);
+                let result = response.iterate(self.positions[a]);
+                previous[a] = self.acceleration.take(a, &before, &result, compliance);
+            }
+        }
+        if has_previous {
+            let share = self.acceleration.share();
+            for a in 0..count {
+                let [position, ..] = self.responses[a].extrapolate(self.positions[a], &previous[a], -share);
+                self.positions[a] = position;
+            }
         }
     }
 
@@ -232,6 +254,7 @@ impl LocalScratch {
             guessed: [DVec3::ZERO; MAX_CONTACTS],
             jacobians: [DMat3::ZERO; MAX_CONTACTS],
             pace: Pace::default(),
+            acceleration: Acceleration::default(),
             best: vec![(DVec3::ZERO, LocalResponse::default()); MAX_CONTACTS],
             has_best: false,
             force_change: 0.0,

@@ -138,7 +138,8 @@ pub fn local_forces(model: &Model, state: &mut State, mut memory: TickMemory<'_>
 fn keep_previous_forces(state: &mut State, slots: &[usize]) {
     for &slot in slots {
         let contact = &mut state.contacts.slots[slot];
-        (contact.force, contact.local.last_step) = (contact.local.force, DVec3::ZERO);
+        contact.force = contact.local.force;
+        (contact.local.last_step, contact.local.last_changes) = Default::default();
     }
 }
 
@@ -160,9 +161,9 @@ fn solve_equations(
         // Extrapolated by the step of the previous tick.
         local.positions[a] = contact.local.relative_position + contact.local.last_step;
         local.free_positions[a] = contact.local.tool_position - free_displacement(model, state, body, slot);
-        local.responses[a].force = contact.local.force;
+        local.responses[a].force = contact.local.force + contact.local.last_changes[0];
         local.responses[a].foot = contact.local.foot;
-        local.responses[a].offset = contact.local.offset;
+        local.responses[a].offset = contact.local.offset + contact.local.last_changes[1];
         local.responses[a].friction =
             FrictionResponse { force: contact.local.friction.force(), ..FrictionResponse::default() };
     }
@@ -174,6 +175,7 @@ fn solve_equations(
     let mut trust = TrustRegion::default();
     local.has_best = false;
     local.pace.begin(cells, radius, slots.len());
+    local.acceleration.reset();
     for step in 0..SNAP_STEPS[0] {
         if cells && step == MOST_CELL_STEPS {
             break;
@@ -216,10 +218,12 @@ fn solve_equations(
             break;
         }
         if step + 1 < local.pace.most_steps() {
-            local.take_step(slots.len());
+            local.take_step(slots.len(), share == 1.0);
         } else if local.pace.has_diverged(longest) {
             return Outcome::Diverged;
         } else {
+            // One that would go on to and fro is not extrapolated either.
+            local.steps[..slots.len()].fill(DVec3::ZERO);
             break;
         }
     }
@@ -408,16 +412,21 @@ fn store_results(
             None => blend_patch(model, state, &local.weights[a], slot, body),
         }
         let contact: &mut Contact = &mut state.contacts.slots[slot];
-        // A new contact has no previous step.
         let is_first = contact.local.force == DVec3::ZERO && model.tools[tool].shape.needs_cells();
-        (contact.force, contact.local.force) = (response.force, response.force);
+        contact.force = response.force;
         (contact.point, contact.normal) = (response.point, response.normal);
         (contact.displacement, contact.tool_displacement) =
             (contact.local.tool_position - contact.anchor, contact.local.tool_position - contact.anchor);
         let own = &mut contact.local;
-        // With the step that was not taken: its extrapolation would be twice as long from tick to tick.
+        // With the step that was not taken: the extrapolation of its error would grow from tick to tick. A new contact has no
+        // previous step.
         let not_taken = if local.pace.cells { DVec3::ZERO } else { local.steps[a] };
         own.last_step = if is_first { DVec3::ZERO } else { local.positions[a] + not_taken - own.relative_position };
+        own.last_changes = match response.has_higher_orders() {
+            true => [response.force - own.force, response.offset - own.offset],
+            false => [DVec3::ZERO; 2],
+        };
+        own.force = response.force;
         own.relative_position = local.positions[a];
         own.previous_orientation = own.orientation;
         (own.offset, own.penetration) = (response.offset, response.indentation.depth);
