@@ -418,9 +418,10 @@ fn store_results(
         (contact.displacement, contact.tool_displacement) =
             (contact.local.tool_position - contact.anchor, contact.local.tool_position - contact.anchor);
         let own = &mut contact.local;
-        // With the step that was not taken: the extrapolation of its error would grow from tick to tick. A new contact has no
-        // previous step.
-        let not_taken = if local.pace.cells { DVec3::ZERO } else { local.steps[a] };
+        // Where the force has been followed, with the step that was not taken: the extrapolation of its error would grow from tick
+        // to tick. A new contact has no previous step.
+        let is_exact = local.pace.cells || local.force_change < FORCE_TOLERANCE;
+        let not_taken = if is_exact { DVec3::ZERO } else { local.steps[a] };
         own.last_step = if is_first { DVec3::ZERO } else { local.positions[a] + not_taken - own.relative_position };
         own.last_changes = match response.has_higher_orders() {
             true => [response.force - own.force, response.offset - own.offset],
