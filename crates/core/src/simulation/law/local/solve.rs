@@ -156,17 +156,7 @@ fn solve_equations(
     local.select_body(body);
     local.others[..slots.len()].fill(OtherContacts::default());
     follow_motion(model, state, weight_scratch, local, slots, body);
-    for (a, &slot) in slots.iter().enumerate() {
-        let contact = &state.contacts.slots[slot];
-        // Extrapolated by the step of the previous tick.
-        local.positions[a] = contact.local.relative_position + contact.local.last_step;
-        local.free_positions[a] = contact.local.tool_position - free_displacement(model, state, body, slot);
-        local.responses[a].force = contact.local.force + contact.local.last_changes[0];
-        local.responses[a].foot = contact.local.foot;
-        local.responses[a].offset = contact.local.offset + contact.local.last_changes[1];
-        local.responses[a].friction =
-            FrictionResponse { force: contact.local.friction.force(), ..FrictionResponse::default() };
-    }
+    start_from_last_tick(model, state, local, slots, body);
     let cells = slots.iter().any(|&slot| contact_needs_cells(model, &state.contacts.slots[slot]));
     local.cell_resolution = cells.then(|| resolution(model, state));
     let [step_factor, force_factor] = if cells { CELL_TOLERANCES } else { [1.0; 2] };
@@ -228,6 +218,20 @@ fn solve_equations(
         }
     }
     if cells && trust.least_residual > LARGEST_RESIDUAL * radius { Outcome::Unsolved } else { Outcome::Converged }
+}
+
+/// Begins with the results of the last tick, extrapolated by its steps.
+fn start_from_last_tick(model: &Model, state: &State, local: &mut LocalScratch, slots: &[usize], body: usize) {
+    for (a, &slot) in slots.iter().enumerate() {
+        let contact = &state.contacts.slots[slot];
+        local.positions[a] = contact.local.relative_position + contact.local.last_step;
+        local.free_positions[a] = contact.local.tool_position - free_displacement(model, state, body, slot);
+        local.responses[a].force = contact.local.force + contact.local.last_changes[0];
+        local.responses[a].foot = contact.local.foot;
+        local.responses[a].offset = contact.local.offset + contact.local.last_changes[1];
+        local.responses[a].friction =
+            FrictionResponse { force: contact.local.friction.force(), ..FrictionResponse::default() };
+    }
 }
 
 /// Whether all tools would be outside of the body, in front of or beside their feet, if no contact had a force.
