@@ -78,7 +78,7 @@ BUSY = ("port", "is in use: choose another with --port, or --port 0 for a free o
         (("run", "scene.toml", "--record", "old.mcap"), ("old.mcap: exists",)),
         (("run", "scene.toml", "--record", "no/a.mcap"), ("no/a.mcap: there is no folder no",)),
         (("demo", "--record", "a.foo"), ("--record a.foo: a recording ends in .mcap: name it a.mcap",)),
-        (("run", "scene.toml", "--map", "none.vtu"), ("none.vtu: no such file",)),
+        (("run", "scene.toml", "--port", "0", "--map", "none.vtu"), ("none.vtu: no such file",)),
         (("run", "scene.toml", "--port", "BUSY"), BUSY),
         (("demo", "--port", "BUSY"), BUSY),
         (("exam", "nodule", "--port", "BUSY"), BUSY),
