@@ -12,7 +12,7 @@
 use glam::DVec3;
 
 use super::MAX_CONTACTS;
-use super::contacts::gathered;
+use super::contacts::SlotList;
 use super::law::law_of;
 use super::model::Model;
 use super::scratch::Scratch;
@@ -119,10 +119,10 @@ fn share_within(state: &mut State, body: usize, limit: f64) -> (f64, bool) {
 
 /// Reduces the displacements of the contacts of a body to the strain limit; zero is no limit.
 pub(super) fn apply(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize, limit: f64) {
-    let (slots, count) = gathered(state.contacts.linear_on(body));
-    let slots = &slots[..count];
+    let list = SlotList::of(state.contacts.linear_on(body));
+    let slots = &*list;
     let State { bodies, contacts, .. } = state;
-    let together = count > 1 && !model.bodies[body].moves();
+    let together = slots.len() > 1 && !model.bodies[body].moves();
     for &slot in slots {
         let contact = &mut contacts.slots[slot];
         contact.limited = false;
@@ -141,7 +141,7 @@ pub(super) fn apply(model: &Model, state: &mut State, scratch: &mut Scratch, bod
     if together && limit > 0.0 {
         bound_displacements(model, state, &mut scratch.system, slots);
     }
-    if limit <= 0.0 || count == 0 {
+    if limit <= 0.0 || slots.is_empty() {
         return;
     }
     let Some(watch) = state.bodies[body].strain.as_deref() else { return };
@@ -172,9 +172,8 @@ fn bound_displacements(model: &Model, state: &mut State, system: &mut System, sl
     let sliding = |slot: usize| contact_displacement(model, current, slot, |other| other.nonlinear);
     let (mut forces, mut short) = ([DVec3::ZERO; MAX_CONTACTS], [false; MAX_CONTACTS]);
     for _ in slots {
-        let (rest, count) = gathered(slots.iter().copied().filter(|&slot| !short[slot]));
-        let rest = &rest[..count];
-        solve_with(model, current, system, rest, compliance, |slot| {
+        let rest = SlotList::of(slots.iter().copied().filter(|&slot| !short[slot]));
+        solve_with(model, current, system, &rest, compliance, |slot| {
             let shortened = slots.iter().filter(|&&other| short[other]);
             let displacement_by_others: DVec3 = shortened.map(|&other| compliance(slot, other) * forces[other]).sum();
             current.contacts.slots[slot].displacement - sliding(slot) - displacement_by_others

@@ -14,7 +14,7 @@ use glam::{DMat3, DVec3};
 
 use super::MAX_CONTACTS;
 use super::body::BodyModel;
-use super::contacts::{Contacts, gathered};
+use super::contacts::{Contacts, SlotList};
 use super::energy::EnergyBalance;
 use super::strike::{STRIKES_AT_ONCE, StrikeInProgress, gather_rows};
 use crate::contact::{Patch, SurfacePoint};
@@ -217,12 +217,11 @@ impl Motion {
         let before = self.patches(modes, &changed, |balance, other| balance.last_force(other));
         // Initial values; only the entries written below are used.
         let mut loaded = [self.strikes[0].loaded(); MAX_CONTACTS + STRIKES_AT_ONCE];
-        let (slots, count) = gathered(contacts.on(body));
-        let slots = &slots[..count];
-        for (patch, &slot) in loaded.iter_mut().zip(slots) {
+        let slots = SlotList::of(contacts.on(body));
+        for (patch, &slot) in loaded.iter_mut().zip(slots.iter()) {
             *patch = LoadedPatch::new(&self.projections[slot], contacts.slots[slot].force);
         }
-        let mut with_strikes = count;
+        let mut with_strikes = slots.len();
         for strike in self.strikes.iter().filter(|strike| strike.force() != DVec3::ZERO) {
             loaded[with_strikes] = strike.loaded();
             with_strikes += 1;
@@ -236,7 +235,7 @@ impl Motion {
         let moved = std::array::from_fn(|slot| after[slot] - before[slot]);
         let weight = modes.integration.weight();
         self.balance.add_step(&step);
-        self.balance.add_contacts(contacts, slots, coupling, &self.residual);
+        self.balance.add_contacts(contacts, &slots, coupling, &self.residual);
         self.balance.add_work((contacts, body), (coupling, weight), &self.residual, &moved);
         for strike in &mut self.strikes {
             self.balance.energy.work += strike.work(modes, &self.predicted.q);

@@ -1,6 +1,6 @@
 //! The tick, in stages.
 
-use super::contacts::{Mode, gathered};
+use super::contacts::{Mode, SlotList};
 use super::input::{Controls, Input, Output};
 use super::law::{Approach, LAWS, is_sound, law_of};
 use super::linear_error::estimate_linear_errors;
@@ -9,7 +9,7 @@ use super::scratch::Scratch;
 use super::slip::slip;
 use super::state::{EntryDepth, State};
 use super::tool::LawKind;
-use super::{MAX_CONTACTS, limit, solve, time};
+use super::{limit, solve, time};
 
 /// Advances the contacts of all tools, and the bodies that move, by one tick; returns the wrenches on the devices.
 pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Input) -> Output {
@@ -49,8 +49,8 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Inp
 fn follow_tools(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize, input: &Input) {
     for (tool, tool_model) in model.tools.iter().enumerate() {
         let tool_input = &input.tools[tool];
-        let (slots, count) = contact_slots(state, tool, body);
-        let slots = &slots[..count];
+        let list = SlotList::of(state.contacts.of(tool, body));
+        let slots = end_pending(state, &list);
         let law_of_contact = slots.first().map(|&slot| state.contacts.slots[slot].law);
         let law = law_of(contact_law(tool_model.law, law_of_contact, tool_input.grab));
         let was_refused = state.tools[tool].refused[body].take();
@@ -59,8 +59,8 @@ fn follow_tools(model: &Model, state: &mut State, scratch: &mut Scratch, body: u
             slots.iter().for_each(|&slot| state.contacts.clear(slot));
             continue;
         }
-        let tool_state = state.tools[tool];
-        let approach = Approach::new(model, state.bodies[body].motion.as_ref(), (tool, body), &tool_state, input);
+        let motion = state.bodies[body].motion.as_ref();
+        let approach = Approach::new(model, motion, (tool, body), &state.tools[tool], input);
         let mut lasts = false;
         for &slot in slots {
             if law.update(&approach, &mut state.contacts.slots[slot]) {
@@ -71,7 +71,7 @@ fn follow_tools(model: &Model, state: &mut State, scratch: &mut Scratch, body: u
                 state.contacts.clear(slot);
             }
         }
-        if count > 0 {
+        if !slots.is_empty() {
             if lasts {
                 law.find_additional(model, state, scratch.memory(), (tool, body));
                 continue;
@@ -94,14 +94,13 @@ fn follow_tools(model: &Model, state: &mut State, scratch: &mut Scratch, body: u
     }
 }
 
-/// Slots of a tool's contacts with a body, and their number. If none of them presses, the pending ones end.
-fn contact_slots(state: &mut State, tool: usize, body: usize) -> ([usize; MAX_CONTACTS], usize) {
-    let (slots, mut count) = gathered(state.contacts.of(tool, body));
-    if slots[..count].iter().all(|&slot| state.contacts.slots[slot].is_pending()) {
-        slots[..count].iter().for_each(|&slot| state.contacts.clear(slot));
-        count = 0;
+/// Ends the contacts of a tool with a body if all are pending, none presses; returns those that go on.
+fn end_pending<'a>(state: &mut State, slots: &'a [usize]) -> &'a [usize] {
+    if slots.iter().all(|&slot| state.contacts.slots[slot].is_pending()) {
+        slots.iter().for_each(|&slot| state.contacts.clear(slot));
+        return &[];
     }
-    (slots, count)
+    slots
 }
 
 /// The law of a tool's contact.

@@ -4,6 +4,8 @@ mod local;
 
 pub use local::LocalContact;
 
+use std::ops::Deref;
+
 use glam::DVec3;
 
 use super::tool::LawKind;
@@ -123,14 +125,31 @@ impl Contact {
     }
 }
 
-/// Some slots, in order, and their number: they are read while the contacts change.
-pub(super) fn gathered(slots: impl Iterator<Item = usize>) -> ([usize; MAX_CONTACTS], usize) {
-    let (mut gathered, mut count) = ([0; MAX_CONTACTS], 0);
-    for slot in slots {
-        gathered[count] = slot;
-        count += 1;
+/// Some slots, in order: they are read while the contacts change.
+pub(super) struct SlotList {
+    slots: [usize; MAX_CONTACTS],
+    count: usize,
+}
+
+impl SlotList {
+    /// Gathers slots. The list is not to be moved: a copy right after its entries are written waits for them.
+    #[inline(always)]
+    pub(super) fn of(slots: impl Iterator<Item = usize>) -> Self {
+        let mut list = Self { slots: [0; MAX_CONTACTS], count: 0 };
+        for slot in slots {
+            list.slots[list.count] = slot;
+            list.count += 1;
+        }
+        list
     }
-    (gathered, count)
+}
+
+impl Deref for SlotList {
+    type Target = [usize];
+
+    fn deref(&self) -> &[usize] {
+        &self.slots[..self.count]
+    }
 }
 
 /// Slots for contacts. The patches are stored separately, so that a pass over the slots reads little memory.

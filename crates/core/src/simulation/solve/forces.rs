@@ -5,7 +5,7 @@ use glam::{DMat3, DVec3};
 use crate::contact::smallest_eigenvalue;
 use crate::contact::smooth::FanWeights;
 use crate::simulation::body::BodyDynamics;
-use crate::simulation::contacts::{Contact, gathered};
+use crate::simulation::contacts::{Contact, SlotList};
 use crate::simulation::model::Model;
 use crate::simulation::state::State;
 use crate::simulation::system::System;
@@ -15,12 +15,12 @@ use crate::simulation::tool::ToolModel;
 /// motion, `C` the static compliance or that of one step, and `s` what is in series with it.
 pub fn contact_forces(model: &Model, state: &mut State, system: &mut System, body: usize) {
     let moving = state.bodies[body].motion.as_ref();
-    let (slots, count) = gathered(state.contacts.linear_on(body));
+    let slots = SlotList::of(state.contacts.linear_on(body));
     solve_with(
         model,
         state,
         system,
-        &slots[..count],
+        &slots,
         |a, b| match moving {
             Some(motion) => motion.compliance(a, b),
             None => state.compliance[a][b] * (1.0 / state.bodies[body].stiffness_scale),
@@ -31,7 +31,7 @@ pub fn contact_forces(model: &Model, state: &mut State, system: &mut System, bod
             state.contacts.slots[slot].displacement - free
         },
     );
-    for (i, &slot) in slots[..count].iter().enumerate() {
+    for (i, &slot) in slots.iter().enumerate() {
         state.contacts.slots[slot].force = DVec3::from_slice(&system.right[3 * i..3 * i + 3]);
     }
 }

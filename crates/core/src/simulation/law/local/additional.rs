@@ -21,7 +21,7 @@ use crate::contact::Concavities;
 use crate::contact::footprint::{OtherPlanes, PlacedShape, Plane};
 use crate::contact::smooth::FootPoint;
 use crate::simulation::MAX_PLACES;
-use crate::simulation::contacts::{Contact, Contacts, LocalContact, Mode, STRAIN_REQUESTS, gathered};
+use crate::simulation::contacts::{Contact, Contacts, LocalContact, Mode, STRAIN_REQUESTS, SlotList};
 use crate::simulation::law::TickMemory;
 use crate::simulation::model::Model;
 use crate::simulation::solve::contact_displacement_at;
@@ -47,9 +47,9 @@ pub fn find_additional_contacts(
     let concavities = &model.concavities[tool][body];
     let lasts = |contact: &Contact| contact.law == LawKind::LOCAL && !contact.local.is_fading;
     let lasting = state.contacts.of(tool, body).filter(|&slot| lasts(&state.contacts.slots[slot]));
-    let (slots, count) = gathered(lasting);
+    let slots = SlotList::of(lasting);
     memory.weight_scratch.near.invalidate();
-    for &slot in &slots[..count] {
+    for &slot in slots.iter() {
         find_beside(model, state, &mut memory, concavities, slot);
     }
 }

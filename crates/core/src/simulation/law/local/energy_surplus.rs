@@ -78,8 +78,7 @@ fn observed_contacts<'a>(
             radius: tool.radius,
             force: response.force,
             torque: response.torque,
-            stored: response.indentation.energy
-                + response.springs().energy()
+            stored: response.local_energy()
                 + 0.5 * response.force.dot(displacement)
                 + response.force.dot(higher.displacement)
                 - higher.energy,

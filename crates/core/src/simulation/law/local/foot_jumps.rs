@@ -251,10 +251,11 @@ pub fn contact_depth(tool: &ToolModel, contact: &Contact, place: DVec3) -> f64 {
 pub fn update_parts(model: &Model, state: &mut State, responses: &[LocalResponse], slots: &[usize]) {
     for grows in [false, true] {
         for (a, &slot) in slots.iter().enumerate() {
-            let Contact { mode, tool, local, .. } = state.contacts.slots[slot];
-            if mode == Mode::Free || (local.part_rate == 0.0 && !local.is_fading) || (local.part_rate > 0.0) != grows {
+            let Contact { mode, tool, local, .. } = &state.contacts.slots[slot];
+            if *mode == Mode::Free || (local.part_rate == 0.0 && !local.is_fading) || (local.part_rate > 0.0) != grows {
                 continue;
             }
+            let (tool, local) = (*tool, *local);
             let whole = responses[a].indentation.energy / local.part;
             let bound = if whole > 0.0 { state.tools[tool].released_energy / whole } else { f64::INFINITY };
             // The plane of a fading contact has no end, but the body has: the contact fades faster, the faster its tool moves.

@@ -20,9 +20,17 @@ pub struct OtherContacts {
     pub motion_turn: Option<DMat3>,
 }
 
+impl OtherContacts {
+    /// Becomes that of none. Without a copy of what has just been written, which would have to wait for it.
+    pub fn reset(&mut self) {
+        (self.slope, self.turn) = (DVec3::ZERO, DVec3::ZERO);
+        (self.motion_slope, self.motion_turn) = (None, None);
+    }
+}
+
 /// Force on the tool from the gradients of the body's compliance and of its motion, N. It is computed from the guessed force, which
 /// agrees with the result when the steps have converged.
-pub fn slope(body: LocalBody<'_>, force: DVec3, others: OtherContacts, fields: &Fields) -> DVec3 {
+pub fn slope(body: LocalBody<'_>, force: DVec3, others: &OtherContacts, fields: &Fields) -> DVec3 {
     let [x, y, z] = force.to_array();
     let products = [x * x, 2.0 * x * y, 2.0 * x * z, y * y, 2.0 * y * z, z * z];
     let own: DVec3 = COMPLIANCE.zip(products).map(|(field, product)| fields.slope(field) * product).sum();

@@ -45,7 +45,7 @@ pub fn evaluate(
     tool: LocalTool<'_>,
     contact: &LocalContact,
     guess: Guess<'_>,
-    others: OtherContacts,
+    others: &OtherContacts,
     cells: CellMemory<'_>,
     (weights, response): (&mut FanWeights, &mut LocalResponse),
 ) -> Option<()> {
@@ -72,7 +72,7 @@ fn evaluate_near_corner(
     tool: LocalTool<'_>,
     contact: &LocalContact,
     guess: Guess<'_>,
-    others: OtherContacts,
+    others: &OtherContacts,
     weights: &mut FanWeights,
     cells: CellMemory<'_>,
 ) -> Option<LocalResponse> {

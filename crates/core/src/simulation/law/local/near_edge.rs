@@ -28,7 +28,7 @@ impl NearEdge {
         // Gradient by the foot itself.
         let fixed = FootPoint { shift: DMat3::IDENTITY, turning: DMat3::ZERO, ..beside.slowed };
         body.smooth.weigh(&fixed, weights);
-        let by_foot = slope(body, force, OtherContacts::default(), &blend_fields(weights, body.fields, false));
+        let by_foot = slope(body, force, &OtherContacts::default(), &blend_fields(weights, body.fields, false));
         body.smooth.weigh(&beside.slowed, weights);
         Some(Self { beside, bending: beside.bending(by_foot) })
     }

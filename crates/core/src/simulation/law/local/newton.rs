@@ -48,8 +48,8 @@ fn block(local: &LocalScratch, a: usize, b: usize) -> DMat3 {
         return block;
     }
     let response = &local.responses[a];
-    let higher = response.higher.compliance * local.jacobians[a] + response.displacement_by_position();
-    block + DMat3::IDENTITY + higher
+    let moved = block + DMat3::IDENTITY + response.displacement_by_position();
+    if response.has_higher_orders() { moved + response.higher.compliance * local.jacobians[a] } else { moved }
 }
 
 /// The equations of all contacts.

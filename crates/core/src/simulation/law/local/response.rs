@@ -116,7 +116,7 @@ pub(super) fn evaluate_sphere(
     tool: LocalTool<'_>,
     contact: &LocalContact,
     guess: Guess<'_>,
-    others: OtherContacts,
+    others: &OtherContacts,
     (weights, response): (&mut FanWeights, &mut LocalResponse),
 ) -> Option<()> {
     let mut foot = match contact.is_fading {
@@ -177,7 +177,7 @@ pub(super) fn evaluate_shape(
     tool: LocalTool<'_>,
     contact: &LocalContact,
     guess: Guess<'_>,
-    others: OtherContacts,
+    others: &OtherContacts,
     cells: CellMemory<'_>,
     (weights, response): (&mut FanWeights, &mut LocalResponse),
 ) -> Option<()> {
@@ -334,7 +334,7 @@ impl LocalResponse {
 
     /// Finds the wrench that follows from the indentation, inclined by the gradients of the compliance and by the other contacts,
     /// and from friction. It costs little beside the indentation, so that it is found again when the other contacts are known.
-    pub fn find_force(&mut self, tool: LocalTool<'_>, contact: &LocalContact, place: DVec3, others: OtherContacts) {
+    pub fn find_force(&mut self, tool: LocalTool<'_>, contact: &LocalContact, place: DVec3, others: &OtherContacts) {
         let indentation = self.indentation;
         let whole = self.slope + others.slope;
         let slope = whole.clamp_length_max(STEEPEST_INCLINATION * indentation.force);
@@ -362,10 +362,12 @@ impl LocalResponse {
         // The slope is that at the guess; what the difference changes follows from its derivative.
         self.force = self.guess.force + by_guess * (self.friction.force - push - self.guess.force);
         let change = self.force - self.guess.force;
-        self.higher = match change.length_squared() < (CLOSE * CLOSE) * self.force.length_squared() {
-            true => self.higher_at_guess.moved(change),
-            false => self.higher_orders_at(self.force),
-        };
+        if self.series.is_some() {
+            self.higher = match change.length_squared() < (CLOSE * CLOSE) * self.force.length_squared() {
+                true => self.higher_at_guess.moved(change),
+                false => self.higher_orders_at(self.force),
+            };
+        }
         let n = self.foot.normal;
         let turning = match tool.shape {
             ToolShape::Sphere { .. } => self.foot.turning,
@@ -376,8 +378,10 @@ impl LocalResponse {
         self.jacobian = outer(n, n) * indentation.stiffness - turning * indentation.force + self.friction_by_position;
         self.jacobian += self.bending;
         self.jacobian = by_guess * self.jacobian;
-        let pressed = outer(self.friction.by_pressing, n) * indentation.stiffness;
-        self.unturned = (DMat3::IDENTITY * (1.0 - part) + self.turning * part, self.jacobian + pressed);
+        if self.series.is_some() {
+            let pressed = outer(self.friction.by_pressing, n) * indentation.stiffness;
+            self.unturned = (DMat3::IDENTITY * (1.0 - part) + self.turning * part, self.jacobian + pressed);
+        }
         if part > 0.0 {
             (self.offset, self.offset_by_force) = (self.offset * part, self.offset_by_force * part);
             self.jacobian = self.unturned.0 * self.jacobian;
@@ -460,7 +464,12 @@ impl LocalResponse {
     }
 
     /// The springs of friction; without a force none is stretched.
-    pub fn springs(&self) -> Friction {
-        if self.force == DVec3::ZERO { Friction::default() } else { self.friction.friction }
+    pub fn springs(&self) -> Option<&Friction> {
+        (self.force != DVec3::ZERO).then_some(&self.friction.friction)
+    }
+
+    /// Energy stored outside the body, J: of the indentation and of the springs of friction.
+    pub fn local_energy(&self) -> f64 {
+        self.indentation.energy + self.springs().map_or(0.0, Friction::energy)
     }
 }

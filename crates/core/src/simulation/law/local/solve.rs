@@ -32,7 +32,7 @@ use crate::contact::local::cells::Resolution;
 use crate::contact::regular::{WIDTH, blend_fields};
 use crate::contact::{Refusal, patch_weights};
 use crate::simulation::MAX_CONTACTS;
-use crate::simulation::contacts::{Contact, Mode, gathered};
+use crate::simulation::contacts::{Contact, Mode, SlotList};
 use crate::simulation::input::Controls;
 use crate::simulation::law::TickMemory;
 use crate::simulation::model::Model;
@@ -101,9 +101,9 @@ pub fn local_forces(model: &Model, state: &mut State, mut memory: TickMemory<'_>
     memory.local.footprint.near.invalidate();
     loop {
         let is_local = |&slot: &usize| state.contacts.slots[slot].law == LawKind::LOCAL;
-        let (slots, count) = gathered(state.contacts.on(body).filter(is_local));
-        let slots = &slots[..count];
-        if count == 0 {
+        let list = SlotList::of(state.contacts.on(body).filter(is_local));
+        let slots = &*list;
+        if slots.is_empty() {
             return state.bodies[body].passivity.reset();
         }
         match solve_equations(model, state, &mut memory, slots, body, controls) {
@@ -113,7 +113,7 @@ pub fn local_forces(model: &Model, state: &mut State, mut memory: TickMemory<'_>
             Outcome::Unsolved => return keep_previous_forces(state, slots),
             Outcome::Diverged if last => return keep_previous_forces(state, slots),
             Outcome::Diverged => {
-                fix_lost_contacts(model, state, &memory.local.steps[..count], slots);
+                fix_lost_contacts(model, state, &memory.local.steps[..slots.len()], slots);
                 last = true;
                 continue;
             }
@@ -154,7 +154,7 @@ fn solve_equations(
 ) -> Outcome {
     let TickMemory { weight_scratch, local, system } = memory;
     local.select_body(body);
-    local.others[..slots.len()].fill(OtherContacts::default());
+    local.others[..slots.len()].iter_mut().for_each(OtherContacts::reset);
     follow_motion(model, state, weight_scratch, local, slots, body);
     start_from_last_tick(model, state, local, slots, body);
     let cells = slots.iter().any(|&slot| contact_needs_cells(model, &state.contacts.slots[slot]));
@@ -350,9 +350,10 @@ fn evaluate_contacts(
             let resolution = cell_resolution.unwrap_or_default();
             let cells = CellMemory { state: pressures, scratch: cells, footprint, resolution, corner_weights };
             let tool = local_tool(model, controls, tool);
-            let LocalResponse { force, foot, offset, friction, .. } = responses[a];
-            let guess = Guess { place: positions[a], force, friction: friction.force, foot: &foot, offset };
-            evaluate(surface, tool, contact, guess, others[a], cells, (&mut weights[a], &mut responses[a]))
+            let LocalResponse { force, foot, offset, friction, .. } = &responses[a];
+            let (foot, friction) = (*foot, friction.force);
+            let guess = Guess { place: positions[a], force: *force, friction, foot: &foot, offset: *offset };
+            evaluate(surface, tool, contact, guess, &others[a], cells, (&mut weights[a], &mut responses[a]))
         });
         match response {
             Some(()) => {
@@ -380,7 +381,7 @@ fn evaluate_contacts(
         for (a, &slot) in slots.iter().enumerate() {
             let Contact { tool, local: contact, .. } = &state.contacts.slots[slot];
             let tool = local_tool(model, controls, *tool);
-            local.responses[a].find_force(tool, contact, local.positions[a], local.others[a]);
+            local.responses[a].find_force(tool, contact, local.positions[a], &local.others[a]);
         }
     }
     local.force_change = slots.iter().enumerate().fold(0.0, |most: f64, (a, _)| {
@@ -438,13 +439,13 @@ fn store_results(
         if !own.is_fading {
             own.foot = response.foot;
         }
-        own.friction = response.springs();
+        own.friction = response.springs().copied().unwrap_or_default();
         let indentation = &response.indentation;
         (contact.torque, contact.radius) = (response.torque, indentation.radius);
         contact.slipping = response.friction.slipping;
         let along = response.normal.dot(response.compliance * response.normal);
         contact.stiffness = indentation.stiffness / (1.0 + along * indentation.stiffness);
-        contact.energy = indentation.energy + response.springs().energy();
+        contact.energy = response.local_energy();
         contact.dissipated = response.friction.dissipated;
         contact.depth = contact_depth(&model.tools[tool], contact, contact.local.tool_position);
         let around = || surroundings(model, state, local, (slots, a), body, controls);

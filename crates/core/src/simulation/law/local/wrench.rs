@@ -199,7 +199,7 @@ mod tests {
                 };
                 let others = OtherContacts::default();
                 let mut evaluated = LocalResponse::default();
-                evaluate(body, tool, &contact, guess, others, cells, (&mut weights, &mut evaluated))
+                evaluate(body, tool, &contact, guess, &others, cells, (&mut weights, &mut evaluated))
                     .expect("an answer");
                 response = evaluated;
                 (contact.foot, contact.penetration) = (response.foot, response.indentation.depth);
