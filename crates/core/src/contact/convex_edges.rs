@@ -21,40 +21,32 @@
 //! there at once. So the compliance is taken at a point that slows down before the edge,
 //!
 //! ```text
-//! x + sum_k n_k (w - |s_k|)^2 / (4 w)        for |s_k| < w
+//! x + sum_k e_k n_k (w - |s_k|)^2 / (4 w)        for |s_k| < w
 //! ```
 //!
+//! with `e_k = 1` on face `k`, and `e_1 = s_2^2/(s_1^2 + s_2^2)` over the edge, so that the point goes round it evenly.
+//!
 //! Both are functions of `p` alone, so that the force is the gradient of one energy as before.
-
-use std::collections::BTreeMap;
-use std::f64::consts::FRAC_PI_2;
 
 use glam::{DMat3, DVec3};
 
 use super::corner_share::ConvexCorner;
 use super::footprint::smooth_step;
 use super::modulus_share::Share;
-use super::smooth::{ConvexCrease, FootPoint, SmoothSurface};
+use super::sharp_edge::{Edge, convex_edges, keep_long, keep_single};
+use super::smooth::{FootPoint, SmoothSurface};
 use super::{SurfaceQuery, TriangleLists};
-use crate::math::{acos, hypot};
+use crate::math::hypot;
 use crate::memory::Ranges;
 use crate::mesh::Surface;
 use crate::tensor::outer;
 
-/// `L`, and `B_0`, `B_1`.
-const LEAST_SHARE: f64 = 0.35;
+/// `B_0`, `B_1`.
 const BESIDE: [f64; 2] = [-0.5, 0.667];
-/// `m = q (M_0 + M_1 q)` with the turn `q` of the normal over a right angle, and its largest value.
-const BY_TURN: [f64; 2] = [0.8, 0.2];
-const MOST_BY_TURN: f64 = 1.0;
-/// Turn of the normal over a right angle beyond which an edge is a blade, which bends as a whole.
-const BLADE: f64 = 1.5;
 /// `w` over the sphere's radius.
 const SLOWED: f64 = 0.3;
 /// Edges up to this distance from a triangle, over the radius, are listed for it.
 const LISTED: f64 = 1.0;
-/// Cosine of the angle between two edges that meet, from which they are pieces of one.
-const SAME_CHAIN: f64 = 0.7;
 /// Cosines between the normal of a foot and that of a face of an edge from which the edge counts, and counts fully.
 const FACING: [f64; 2] = [0.0, 0.5];
 /// Length over the sphere's radius from which an edge counts, and distances beyond its end from which it counts in part, and not.
@@ -68,22 +60,6 @@ const MOST_CHAINS: usize = 4;
 const SAME_DISTANCE: f64 = 1e-9;
 /// Distance of a foot from an edge on which it lies, over the radius.
 const ON_EDGE: f64 = 1e-6;
-
-/// A piece of a sharp convex edge.
-#[derive(Clone, Copy, Debug)]
-struct Edge {
-    ends: [DVec3; 2],
-    along: DVec3,
-    /// Unit vectors from the edge into both faces, and the normals of these.
-    into: [DVec3; 2],
-    normals: [DVec3; 2],
-    /// `m (1 - L)`.
-    deficit: f64,
-    /// Number of the edge; all its pieces have the same.
-    chain: u32,
-    /// Whether the edge ends with each end of this piece.
-    is_last: [bool; 2],
-}
 
 /// Sharp convex edges of a surface, for a sphere.
 pub struct ConvexEdges {
@@ -140,13 +116,6 @@ impl BesideEdges {
 }
 
 impl Edge {
-    /// Squared distance of a point, m^2.
-    fn distance_squared(&self, point: DVec3) -> f64 {
-        let length = self.ends[0].distance(self.ends[1]);
-        let at = (point - self.ends[0]).dot(self.along).clamp(0.0, length);
-        point.distance_squared(self.ends[0] + self.along * at)
-    }
-
     /// Squared distance of a foot, m^2, by which the piece of an edge is chosen. Around the common end of two pieces it is the same for
     /// both: there the one farther from the centre counts, so that the position across the edge is continuous.
     fn remoteness(&self, foot: DVec3, centre: DVec3) -> f64 {
@@ -200,7 +169,7 @@ impl Edge {
         }
     }
 
-    /// Slows the foot down before the edge.
+    /// Slows the foot down before the edge, and turns it round the edge over it.
     fn slow(&self, across: &Across, width: f64, beside: &mut BesideEdges) {
         for k in (0..2).filter(|&k| across.face.is_none_or(|face| face == k)) {
             let (s, slope, into) = (across.places[k], across.slopes[k], self.into[k]);
@@ -210,12 +179,31 @@ impl Edge {
             }
             // Of `-|s|`; right on the edge the foot itself does not move.
             let falling = if across.face.is_some() || s > 0.0 { -1.0 } else { 1.0 };
+            let (share, share_slope) = across.share_of_face(k);
+            let part = across.part * share;
             let moved = left * left / (4.0 * width);
-            beside.slowed.position += into * (moved * across.part);
-            beside.slowed.shift += outer(into, slope) * (across.part * falling * left / (2.0 * width));
-            beside.slowed.shift += outer(into, across.part_slope) * moved;
-            beside.bend(into, across.part * 0.5 / width);
+            beside.slowed.position += into * (moved * part);
+            beside.slowed.shift += outer(into, slope) * (part * falling * left / (2.0 * width));
+            beside.slowed.shift += outer(into, across.part_slope * share + share_slope * across.part) * moved;
+            beside.bend(into, part * 0.5 / width);
         }
+    }
+}
+
+impl Across {
+    /// Share of a face in the way of the foot, one on the face itself and over its border, zero over that of the other one, and its
+    /// gradient, 1/m.
+    fn share_of_face(&self, k: usize) -> (f64, DVec3) {
+        if self.face.is_some() {
+            return (1.0, DVec3::ZERO);
+        }
+        let [own, other] = [k, 1 - k].map(|k| self.places[k].min(0.0));
+        let squared = own * own + other * other;
+        if squared == 0.0 {
+            return (0.5, DVec3::ZERO);
+        }
+        let gradient = (self.slopes[1 - k] * own - self.slopes[k] * other) * (2.0 * own * other / (squared * squared));
+        (other * other / squared, gradient)
     }
 }
 
@@ -311,124 +299,11 @@ impl ConvexEdges {
     }
 }
 
-/// Creases whose faces turn away from each other, sorted by chain.
-fn convex_edges(surface: &Surface, smooth: &SmoothSurface) -> Vec<Edge> {
-    let (mut edges, mut nodes) = (Vec::new(), Vec::new());
-    for crease in smooth.convex_creases(surface) {
-        let ConvexCrease { ends, normals, .. } = crease;
-        let turn = acos(normals[0].dot(normals[1]).clamp(-1.0, 1.0)) / FRAC_PI_2;
-        if turn > BLADE {
-            continue;
-        }
-        let along = (ends[1] - ends[0]).normalize_or_zero();
-        let into = [normals[0].cross(along), along.cross(normals[1])];
-        let by_turn = (turn * (BY_TURN[0] + BY_TURN[1] * turn)).min(MOST_BY_TURN);
-        let deficit = by_turn * (1.0 - LEAST_SHARE);
-        edges.push(Edge { ends, along, into, normals, deficit, chain: u32::MAX, is_last: [true; 2] });
-        nodes.push(crease.nodes);
-    }
-    number_chains(&mut edges, &nodes);
-    edges.sort_by_key(|edge| edge.chain);
-    edges
-}
-
-/// Keeps edges that are no shorter than a length, m.
-fn keep_long(edges: &mut Vec<Edge>, length: f64) {
-    let mut lengths: BTreeMap<u32, f64> = BTreeMap::new();
-    edges.iter().for_each(|edge| *lengths.entry(edge.chain).or_default() += edge.ends[0].distance(edge.ends[1]));
-    edges.retain(|edge| lengths[&edge.chain] >= length);
-}
-
-/// Keeps edges without another one beside them: between two edges the body is a bar or a rim, not a wedge.
-fn keep_single(edges: &mut Vec<Edge>, distance: f64) {
-    let middle = |edge: &Edge| (edge.ends[0] + edge.ends[1]) * 0.5;
-    // Pieces by cubes of a size that holds each and its surroundings.
-    let longest = edges.iter().map(|edge| edge.ends[0].distance(edge.ends[1])).fold(distance, f64::max);
-    let cube = |at: DVec3| (at / longest).floor().to_array().map(|place| place as i64);
-    let mut cubes: BTreeMap<[i64; 3], Vec<Edge>> = BTreeMap::new();
-    edges.iter().for_each(|edge| cubes.entry(cube(middle(edge))).or_default().push(*edge));
-    let is_beside = |edge: &Edge, other: &Edge| {
-        let near = |point: &DVec3| other.distance_squared(*point) < distance * distance;
-        other.chain != edge.chain
-            && other.along.dot(edge.along).abs() > SAME_CHAIN
-            && (edge.ends.iter().any(near) || near(&middle(edge)))
-    };
-    edges.retain(|edge| {
-        let [x, y, z] = cube(middle(edge));
-        let around = (0..125).map(|k| [x + k % 5 - 2, y + k / 5 % 5 - 2, z + k / 25 - 2]);
-        !around.filter_map(|place| cubes.get(&place)).flatten().any(|other| is_beside(edge, other))
-    });
-}
-
-/// Numbers the chains of pieces that go on in about the same direction.
-fn number_chains(edges: &mut [Edge], nodes: &[[u32; 2]]) {
-    let mut at_node: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
-    for (edge, ends) in nodes.iter().enumerate() {
-        ends.iter().for_each(|&node| at_node.entry(node).or_default().push(edge));
-    }
-    let mut chains = 0;
-    for first in 0..edges.len() {
-        if edges[first].chain != u32::MAX {
-            continue;
-        }
-        edges[first].chain = chains;
-        let mut open = vec![first];
-        while let Some(edge) = open.pop() {
-            for end in 0..2 {
-                let node = nodes[edge][end];
-                let away = |edge: usize| edges[edge].along * if nodes[edge][0] == node { 1.0 } else { -1.0 };
-                // Two pieces that leave a node in about the same direction are the sides of a rim.
-                let goes_on = |&&other: &&usize| away(edge).dot(away(other)) < -SAME_CHAIN;
-                let next: Vec<usize> = at_node[&node].iter().filter(goes_on).copied().collect();
-                edges[edge].is_last[end] = next.is_empty();
-                for other in next {
-                    if edges[other].chain == u32::MAX {
-                        edges[other].chain = chains;
-                        open.push(other);
-                    }
-                }
-            }
-        }
-        chains += 1;
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeSet;
-
     use super::*;
     use crate::contact::smooth::DrawnSurface;
-    use crate::contact::smooth::tests::{ball, cube, near};
-    use crate::mesh::Faces;
-
-    #[test]
-    fn a_ball_has_no_edges_and_a_cube_has_twelve() {
-        let of = |surface: &Surface| convex_edges(surface, &SmoothSurface::new(surface));
-        assert!(of(&ball(24)).is_empty());
-        let edges = of(&cube());
-        assert_eq!(edges.iter().map(|edge| edge.chain).collect::<BTreeSet<_>>().len(), 12);
-        assert!(edges.iter().all(|edge| (edge.deficit - (1.0 - LEAST_SHARE)).abs() < 1e-12));
-    }
-
-    /// A thin wedge of length 1: its top has two edges that leave the tip at 10 degrees.
-    fn wedge() -> Surface {
-        let [tip, left, right] = [DVec3::ZERO, DVec3::new(1.0, 0.09, 0.0), DVec3::new(1.0, -0.09, 0.0)];
-        let positions = [0.0, 1.0].iter().flat_map(|&z| [tip, left, right].map(|at| at + z * DVec3::Z)).collect();
-        let faces = vec![[0, 1, 2], [3, 5, 4], [0, 4, 1], [0, 3, 4], [0, 2, 5], [0, 5, 3], [1, 4, 5], [1, 5, 2]];
-        Surface::new(positions, Faces::Linear(faces)).expect("a surface")
-    }
-
-    #[test]
-    fn edges_that_leave_a_node_side_by_side_are_two_and_end_there() {
-        let surface = wedge();
-        let edges = convex_edges(&surface, &SmoothSurface::new(&surface));
-        let on_top = |edge: &&Edge| edge.ends.iter().all(|end| end.z == 1.0) && edge.ends.contains(&DVec3::Z);
-        let sides: Vec<&Edge> = edges.iter().filter(on_top).collect();
-        assert_eq!(sides.len(), 2);
-        assert_ne!(sides[0].chain, sides[1].chain);
-        assert!(sides.iter().all(|edge| edge.is_last == [true; 2]));
-    }
+    use crate::contact::smooth::tests::{cube, near};
 
     #[test]
     fn short_edges_do_not_count() {
@@ -438,7 +313,7 @@ mod tests {
         assert!(count(0.45) && !count(1.01));
     }
 
-    /// Along a way from the top over an edge to the side, and near a corner.
+    /// Along a way from the top over an edge to the side, near a corner, and low over the edge.
     #[test]
     fn shares_and_feet_have_continuous_derivatives() {
         let (surface, radius) = (cube(), 0.2);
@@ -450,8 +325,8 @@ mod tests {
             edges.beside(&foot, centre)
         };
         assert!(beside(DVec3::new(0.5, 0.5, 1.1)).is_none());
-        for along in [0.5, 0.95] {
-            let way = |k: f64| DVec3::new(0.86 + 0.3 * k, along, 1.2 - 0.25 * k);
+        for (along, height, fall) in [(0.5, 0.2, 0.25), (0.95, 0.2, 0.25), (0.5, 0.03, 0.0)] {
+            let way = |k: f64| DVec3::new(0.86 + 0.3 * k, along, 1.0 + height - fall * k);
             let mut before: Option<BesideEdges> = None;
             for step in 0..400 {
                 let centre = way(f64::from(step) / 400.0);
@@ -468,6 +343,7 @@ mod tests {
                 }
                 if let Some(before) = before {
                     assert!(before.share.gradient.distance(at.share.gradient) < 0.3 / radius, "{centre}");
+                    assert!(before.slowed.position.distance(at.slowed.position) < 2e-3, "{centre}");
                 }
                 before = Some(at);
             }

@@ -18,6 +18,7 @@ mod quadrature;
 pub mod regular;
 mod regular_store;
 pub mod shape;
+mod sharp_edge;
 pub mod smooth;
 mod tessellation;
 mod thin;
