@@ -98,7 +98,7 @@ test: | check-tools
 	@# each of them takes on, and in which order.
 	$(PYTEST) --numprocesses 3 -m "not slow" $(ARGS)
 
-# Slow tests and campaigns of random touches, presses, writers and answers. CI runs a twenty-fourth of their files after `make
+# Slow tests and campaigns of random touches, presses, writers and answers. CI runs a thirty-second of their files after `make
 # test`, with a share of the cases; `make campaigns ARGS=--whole` takes all, about an hour.
 campaigns: $(VENV)/.installed $(PAGE) $(WEB)
 	$(PYTEST) --numprocesses 2 -m slow $(ARGS)

@@ -212,10 +212,14 @@ fn solve_equations(
         } else if local.pace.has_diverged(longest) {
             return Outcome::Diverged;
         } else {
-            // One that would go on to and fro is not extrapolated either.
+            // One that would go on to and fro is not extrapolated.
             local.steps[..slots.len()].fill(DVec3::ZERO);
             break;
         }
+    }
+    // Where the force has been followed, the step that was not taken counts in that of the tick: its error would grow from tick to tick.
+    if cells || local.force_change < FORCE_TOLERANCE {
+        local.steps[..slots.len()].fill(DVec3::ZERO);
     }
     if cells && trust.least_residual > LARGEST_RESIDUAL * radius { Outcome::Unsolved } else { Outcome::Converged }
 }
@@ -423,11 +427,9 @@ fn store_results(
         (contact.displacement, contact.tool_displacement) =
             (contact.local.tool_position - contact.anchor, contact.local.tool_position - contact.anchor);
         let own = &mut contact.local;
-        // Where the force has been followed, with the step that was not taken: the extrapolation of its error would grow from tick
-        // to tick. A new contact has no previous step.
-        let is_exact = local.pace.cells || local.force_change < FORCE_TOLERANCE;
-        let not_taken = if is_exact { DVec3::ZERO } else { local.steps[a] };
-        own.last_step = if is_first { DVec3::ZERO } else { local.positions[a] + not_taken - own.relative_position };
+        // A new contact has no previous step.
+        let reached = local.positions[a] + local.steps[a];
+        own.last_step = if is_first { DVec3::ZERO } else { reached - own.relative_position };
         own.last_changes = match response.has_higher_orders() {
             true => [response.force - own.force, response.offset - own.offset],
             false => [DVec3::ZERO; 2],
