@@ -88,12 +88,13 @@ impl StrainEnd {
     /// body whose request finds no room. Never allocates or blocks.
     pub fn ask(&mut self, state: &State, limits: &[f64; MAX_BODIES], tick: u64, skipped: u32) -> u32 {
         let mut unsent = 0;
-        for (body, (latest, &limit)) in self.latest.iter_mut().zip(limits).enumerate() {
+        let limited = self.latest.iter_mut().zip(limits).enumerate().filter(|(_, (_, limit))| **limit > 0.0);
+        for (body, (latest, &limit)) in limited {
             let mut now = ([0; MAX_CONTACTS_WATCHED], limit);
             for (serial, (contact, _)) in now.0.iter_mut().zip(state.contacts.iter().filter(|(c, _)| c.body == body)) {
                 *serial = contact.serial;
             }
-            if now == *latest || limit <= 0.0 || now.0[0] == 0 {
+            if now == *latest || now.0[0] == 0 {
                 continue;
             }
             if self.requests.is_full() || skipped & 1 << body != 0 {

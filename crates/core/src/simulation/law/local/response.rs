@@ -469,6 +469,7 @@ impl LocalResponse {
     }
 
     /// Energy stored outside the body, J: of the indentation and of the springs of friction.
+    #[inline]
     pub fn local_energy(&self) -> f64 {
         self.indentation.energy + self.springs().map_or(0.0, Friction::energy)
     }
