@@ -21,6 +21,9 @@ from benches.strain.elements import lacking_rows
 from benches.strain.elements import table as elements_table
 from benches.strain.peers import beside_peers, left_out
 from benches.strain.peers import table as peers_table
+from benches.strain.sharp_edge import pairs
+from benches.strain.sharp_edge import plot as plot_slips
+from benches.strain.sharp_edge import table as slips_table
 from benches.strain.ticks import sliding_ticks
 from palpate.scene import BuiltScene, Scene
 from palpate.scene.series import with_series
@@ -142,6 +145,7 @@ def strain(
     ticks: Annotated[bool, typer.Option("--ticks", help="Time sliding ticks of A and B instead.")] = False,
     peers: Annotated[bool, typer.Option("--peers", help="Press a column by MuJoCo and Drake instead.")] = False,
     elements: Annotated[bool, typer.Option("--elements", help="Measure what elements lack of a half-space.")] = False,
+    edge: Annotated[bool, typer.Option("--edge", help="Carry a sphere over a sharp edge instead.")] = False,
 ) -> None:
     """Press spheres into neo-Hookean bodies: errors of the linear law, A and B beside full Newton solutions.
 
@@ -156,6 +160,14 @@ def strain(
     if elements:
         lacking = list(lacking_rows())
         show(as_json, lacking, elements_table(lacking))
+        return
+    if edge:
+        carried, folder = list(pairs()), make_folder(out)
+        slips = [pair.row() for pair in carried]
+        show(as_json, slips, slips_table(slips))
+        if folder is not None:
+            plot_slips(carried, folder / "edge-slips.png")
+            print_written(folder / "edge-slips.png")
         return
     if peers:
         found = beside_peers()

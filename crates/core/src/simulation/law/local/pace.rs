@@ -49,8 +49,13 @@ impl Pace {
         }
     }
 
-    pub fn most_steps(&self) -> usize {
-        self.steps()[0]
+    /// Whether another step follows, by the longest of the last whole steps, m. One that has diverged beside an edge goes on as a snap:
+    /// where the body's compliance changes fast a contact loses its equilibrium before its stiffness shows it.
+    pub fn goes_on(&mut self, step: usize, longest: f64, may_slip: impl FnOnce() -> bool) -> bool {
+        if step + 1 >= self.steps()[0] && !self.snaps && self.has_diverged(longest) {
+            self.snaps = may_slip();
+        }
+        step + 1 < self.steps()[0]
     }
 
     /// Takes whole steps, and whether a contact is unstable.

@@ -13,8 +13,8 @@ use super::additional::other_planes;
 use super::coupling::{blend_patch, couple};
 use super::energy_surplus::{commit_energy, observe_energy, remove_energy_surplus};
 use super::foot_jumps::{
-    SolvedContacts, contact_depth, continue_contact, fade_merged_contacts, fix_lost_contacts, fix_snapping_contacts,
-    foot_has_jumped, replace_jumped_contacts, update_parts,
+    SolvedContacts, any_may_slip, contact_depth, continue_contact, fade_merged_contacts, fix_lost_contacts,
+    fix_snapping_contacts, foot_has_jumped, replace_jumped_contacts, update_parts,
 };
 use super::force_error::{ForceError, estimate};
 use super::half_space::LocalTool;
@@ -207,7 +207,7 @@ fn solve_equations(
         {
             break;
         }
-        if step + 1 < local.pace.most_steps() {
+        if local.pace.goes_on(step, longest, || any_may_slip(model, state, slots)) {
             local.take_step(slots.len(), share == 1.0);
         } else if local.pace.has_diverged(longest) {
             return Outcome::Diverged;
