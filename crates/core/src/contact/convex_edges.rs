@@ -153,7 +153,7 @@ impl Edge {
     fn share(&self, across: &Across, radius: f64) -> Share {
         let at = match across.face {
             Some(face) => Share { value: across.places[face], gradient: across.slopes[face], hessian: DMat3::ZERO },
-            None => over_edge(across),
+            None => across.over_edge(),
         };
         let width = (BESIDE[1] - BESIDE[0]) * radius;
         let x = (at.value / radius - BESIDE[0]) / (BESIDE[1] - BESIDE[0]);
@@ -194,34 +194,38 @@ impl Edge {
 }
 
 impl Across {
+    /// Over the edge, the unit vector of its position in the plane across it, both places at most zero, and its length, m; `None` for
+    /// the edge itself.
+    fn direction(&self) -> Option<([f64; 2], f64)> {
+        let [x, y] = self.places.map(|place| place.min(0.0));
+        let size = hypot(x, y);
+        (size > 0.0).then_some(([x / size, y / size], size))
+    }
+
     /// Share of a face in the way of the foot, one on the face itself and over its border, zero over that of the other one, and its
     /// gradient, 1/m.
     fn share_of_face(&self, k: usize) -> (f64, DVec3) {
         if self.face.is_some() {
             return (1.0, DVec3::ZERO);
         }
-        let [own, other] = [k, 1 - k].map(|k| self.places[k].min(0.0));
-        let squared = own * own + other * other;
-        if squared == 0.0 {
-            return (0.5, DVec3::ZERO);
-        }
-        let gradient = (self.slopes[1 - k] * own - self.slopes[k] * other) * (2.0 * own * other / (squared * squared));
-        (other * other / squared, gradient)
+        let Some((unit, size)) = self.direction() else { return (0.5, DVec3::ZERO) };
+        let (own, other) = (unit[k], unit[1 - k]);
+        let gradient = (self.slopes[1 - k] * own - self.slopes[k] * other) * (2.0 * own * other / size);
+        (other * other, gradient)
     }
-}
 
-/// `-s_1 s_2 / sqrt(s_1^2 + s_2^2)`.
-fn over_edge(across: &Across) -> Share {
-    let ([x, y], [n, m]) = (across.places, across.slopes);
-    let size = hypot(x, y).max(f64::MIN_POSITIVE);
-    let (x, y) = (x.min(0.0) / size, y.min(0.0) / size);
-    let mixed = outer(n, m);
-    Share {
-        value: -x * y * size,
-        gradient: -(n * (y * y * y) + m * (x * x * x)),
-        hessian: (outer(n, n) * (x * y * y * y) + outer(m, m) * (x * x * x * y)
-            - (mixed + mixed.transpose()) * (x * x * y * y))
-            * (3.0 / size),
+    /// `-s_1 s_2 / sqrt(s_1^2 + s_2^2)`.
+    fn over_edge(&self) -> Share {
+        let Some(([x, y], size)) = self.direction() else { return Share { value: 0.0, ..Share::WHOLE } };
+        let [n, m] = self.slopes;
+        let mixed = outer(n, m);
+        Share {
+            value: -x * y * size,
+            gradient: -(n * (y * y * y) + m * (x * x * x)),
+            hessian: (outer(n, n) * (x * y * y * y) + outer(m, m) * (x * x * x * y)
+                - (mixed + mixed.transpose()) * (x * x * y * y))
+                * (3.0 / size),
+        }
     }
 }
 
