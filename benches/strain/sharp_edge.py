@@ -32,7 +32,8 @@ SIZE, MATERIAL = (0.08, 0.05, 0.05), NeoHookean(10e3, 0.45)
 STEP = 0.5e-3
 # Edges of the loop's elements, and a step of the loop, m.
 LOOP_CELL, TICK = 5e-3, 20e-6
-# Forces of full solutions, N, by tool and depth over the radius.
+# Full solutions by tool and depth over the radius: places x and z, m, and forces x and z, N; their columns.
+IN_PLANE = [0, 2, 3, 5]
 SOLVED = Path(__file__).with_name("edge_forces.json")
 # Fine elements reach so far from the edge over the top and down the side, and so far along it, m.
 FINE, ALONG, CELL = 0.018, 0.010, 2.5e-3
@@ -76,7 +77,7 @@ class Tool:
         return np.array([(start, 0.0, top - d) for d in down] + [(x, 0.0, top - depth) for x in out])
 
 
-TOOLS = (Tool("sphere", 6e-3, 0.0, 0.010, (1.0, 1.5, 2.0)), Tool("capsule", 3e-3, 0.018, 0.015, (1.5,)))
+TOOLS = (Tool("sphere", 6e-3, 0.0, 0.010, (1.0, 1.5)), Tool("capsule", 3e-3, 0.018, 0.015, (1.5,)))
 
 
 @dataclass(frozen=True)
@@ -190,6 +191,8 @@ class EdgedBlock(Solid):
             pushed, contact, force = self._contact(centre, radius)
             residual = (forces + pushed)[self._free]
             if np.abs(residual).max() <= TOLERANCE * max(np.linalg.norm(force), 1e-4):
+                if force[2] < -TOLERANCE:
+                    raise DivergedError("the surface has passed through the tool")
                 return force
             whole = (tangent + contact)[self._free][:, self._free]
             shift = self._descend(whole, residual, shift, (centre, radius))
@@ -264,16 +267,18 @@ def pairs() -> Iterator[Pair]:
 
 
 def full_solution(tool: Tool, part: float) -> Carried:
-    """Return the full solution at a depth over the radius, whose forces are stored beside this file."""
-    path = tool.path(part * tool.radius, STEP)
+    """Return the full solution at a depth over the radius; its places and forces in the plane are stored."""
     stored = json.loads(SOLVED.read_text()) if SOLVED.exists() else {}
-    asked = f"{tool.name}, {part:g} R, elements of {1e3 * CELL:g} mm"
-    if len(stored.get(asked, [])) != len(path):
-        forces = EdgedBlock(block(), MATERIAL, tool).carry(path).forces
-        stored[asked] = forces.round(5).tolist()
-        lines = ",\n".join(f"{json.dumps(name)}: {json.dumps(found)}" for name, found in stored.items())
+    asked = f"{tool.name}, {part:g} R, elements of {1e3 * CELL:g} mm, steps of {1e3 * STEP:g} mm"
+    if asked not in stored:
+        path = tool.path(part * tool.radius, STEP)
+        found = np.hstack([path, EdgedBlock(block(), MATERIAL, tool).carry(path).forces])
+        stored[asked] = found[:, IN_PLANE].round(6).tolist()
+        lines = ",\n".join(f"{json.dumps(name)}: {json.dumps(rows)}" for name, rows in stored.items())
         SOLVED.write_text(f"{{\n{lines}\n}}\n")
-    return Carried(path, np.array(stored[asked]))
+    both = np.zeros((len(stored[asked]), 6))
+    both[:, IN_PLANE] = stored[asked]
+    return Carried(both[:, :3], both[:, 3:])
 
 
 class LoopBlock:

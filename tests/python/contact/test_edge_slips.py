@@ -19,16 +19,22 @@ INSIDE = 0.010
 # places the edge slips, m; and what the hand loses, over the most that it has put in. `python -m benches strain --edge`
 # solved them; the full solution stands in `benches/strain/edge_forces.json`.
 FULL = {
+    1.0: (
+        [-6.12e-3, -3.21e-3, 1.16e-3, 3.10e-3],
+        [[0.041, 0.414], [0.061, 0.361], [0.171, 0.049], [0.082, 0.019]],
+        [0.7e-3, 1.2e-3],
+        0.142,
+    ),
     1.5: (
-        [-6e-3, -3e-3, 0.0, 3e-3],
-        [[0.103, 0.706], [0.148, 0.616], [0.291, 0.047], [0.115, 0.011]],
+        [-6e-3, -4e-3, 0.0, 3e-3],
+        [[0.103, 0.706], [0.132, 0.651], [0.291, 0.047], [0.115, 0.011]],
         [-1.0e-3, -0.5e-3],
         0.315,
     ),
 }
-# Largest difference of a force, over the largest on the way; of the place at which the edge slips, over the radius; of
+# Largest difference of a force, over the largest of these; of the place at which the edge slips, over the radius; of
 # what is lost.
-TOLERANCE, PLACE, LOSS = 0.05, 0.4, 0.1
+TOLERANCE, PLACE, LOSS = 0.035, 0.4, 0.1
 
 
 @pytest.fixture(scope="module")
@@ -59,11 +65,11 @@ def carried(request, simulation) -> tuple[float, np.ndarray, np.ndarray]:
 
 
 def differences(depth: float, path: np.ndarray, forces: np.ndarray) -> np.ndarray:
-    """Differences of the forces at the places of the full solution, over the largest on the way."""
+    """Differences of the forces at the places of the full solution, over its largest."""
     places, full, _, _ = FULL[depth]
     out = path[:, 2] < path[:, 2].min() + 1e-9
     found = forces[out][np.searchsorted(path[out, 0], SIZE[0] + np.array(places) - 1e-9)]
-    return np.linalg.norm(found[:, [0, 2]] - full, axis=1) / np.linalg.norm(forces, axis=1).max()
+    return np.linalg.norm(found[:, [0, 2]] - full, axis=1) / np.linalg.norm(full, axis=1).max()
 
 
 def test_forces_are_those_of_the_full_solution(carried):
@@ -85,10 +91,10 @@ def test_the_hand_loses_as_much_as_in_the_full_solution(carried):
 
 
 def test_wrong_forces_are_seen(carried):
-    """Falsified: 7 % off, of the wrong sign outwards, and as before the edge slips."""
+    """Falsified: 5 % off, of the wrong sign outwards, and as before the edge slips."""
     depth, path, forces = carried
     wrong = {
-        "too high": 1.07 * forces,
+        "too high": 1.05 * forces,
         "outwards is inwards": forces * [-1.0, 1.0, 1.0],
         "no slip": np.where((path[:, 0] > SIZE[0] - 4e-3)[:, None], forces[path[:, 0] < SIZE[0] - 4e-3][-1], forces),
     }

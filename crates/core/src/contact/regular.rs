@@ -15,9 +15,7 @@
 //! k = 2304/pi int_0^inf J_3(t)^2 / t^6 dt = 0.766544
 //! ```
 //!
-//! and the tangential one `c_n (1 - nu/2) / (1 - nu)` by Cerruti's solution; normal and tangent do not couple. Where the surface bends
-//! within `b` the half-space has the patch's projection on the tangent plane (`bend`): on a round of 6 mm a patch of 9 mm is 4 % narrower,
-//! and without that a capsule along it is 3 % too soft.
+//! and the tangential one `c_n (1 - nu/2) / (1 - nu)` by Cerruti's solution; normal and tangent do not couple.
 //!
 //! Elements follow the half-space below the patch only in part: their compliance lacks a share `e` of `c_half(b)`, and
 //! `(1 - e) c_half(b)` is what is subtracted. With the mean spacing `h` of the nodes on the surface, blocks of 10-node elements have,
@@ -81,9 +79,6 @@ const LACKING: [f64; 2] = [0.0193, 0.000_22];
 const MOST_INCOMPRESSIBLE: f64 = 50.0;
 /// Compliance over `c_half(b)` up to which that counts fully, and from which on not at all: at edges, and in thin parts that bend.
 const COMPACT: [f64; 2] = [1.2, 1.5];
-/// A patch on a cylinder of curvature `kappa`, as far as its points lie within `b`, has the second moment across the axis of a flat
-/// one over `1 + BENT kappa^2 b^2`: to 1 % up to `kappa b = 2`.
-const BENT: f64 = 0.06;
 /// Factor by which `b` is reduced until its nodes fit into a patch.
 const SHORTENING: f64 = 0.9;
 /// Stiffest regular part over `1 / (E* R)`: the local compliance of the largest contact, `1 / (2 E* R)`, outweighs it.
@@ -260,7 +255,7 @@ impl Probe<'_> {
 
     /// `W^T Psi W - c_half(b)`, with both of the same elements, for a patch of radius `wide` whose compliance is known.
     fn regular(&self, compliance: &DMat3, fan: &Fan, wide: f64) -> DMat3 {
-        let half_space = half_space(self.body.moduli, fan, wide / bend(fan, wide));
+        let half_space = half_space(self.body.moduli, fan, wide);
         let along = |matrix: &DMat3| fan.normal.dot(*matrix * fan.normal);
         let share = match self.body.green.surface.faces {
             Faces::Quadratic(_) => {
@@ -400,13 +395,6 @@ fn lacking(poisson: f64, spacings: f64) -> f64 {
 /// Part of it that counts where the body yields so many times as much as a half-space.
 fn compact(ratio: f64) -> f64 {
     ((COMPACT[1] - ratio) / (COMPACT[1] - COMPACT[0])).clamp(0.0, 1.0)
-}
-
-/// How much wider a patch is than its projection on the tangent plane, as a circle of the same area.
-fn bend(fan: &Fan, wide: f64) -> f64 {
-    let (squares, product) = (4.0 * fan.mean * fan.mean - 2.0 * fan.gauss, fan.gauss * fan.gauss);
-    let (by_squares, by_product) = (BENT * wide * wide, (BENT * wide * wide).powi(2));
-    (1.0 + by_squares * squares + by_product * product).sqrt().sqrt()
 }
 
 /// `c_half(b)`.

@@ -8,7 +8,7 @@ use crate::Result;
 use crate::arrays_file::ArraysKind;
 
 /// Version of the computation and of the file's layout; part of the key.
-const VERSION: u32 = 16;
+const VERSION: u32 = 15;
 const KIND: ArraysKind = ArraysKind { format: "palpate-contact", name: "file of contacts", version: VERSION };
 /// Suffix of the files, after the beginning of the key.
 const ENDING: &str = "contact.palpate";
