@@ -145,7 +145,9 @@ def strain(
     ticks: Annotated[bool, typer.Option("--ticks", help="Time sliding ticks of A and B instead.")] = False,
     peers: Annotated[bool, typer.Option("--peers", help="Press a column by MuJoCo and Drake instead.")] = False,
     elements: Annotated[bool, typer.Option("--elements", help="Measure what elements lack of a half-space.")] = False,
-    edge: Annotated[bool, typer.Option("--edge", help="Carry a sphere over a sharp edge instead.")] = False,
+    edge: Annotated[
+        bool, typer.Option("--edge", help="Carry a sphere and a capsule over a sharp edge instead.")
+    ] = False,
 ) -> None:
     """Press spheres into neo-Hookean bodies: errors of the linear law, A and B beside full Newton solutions.
 

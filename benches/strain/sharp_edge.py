@@ -1,8 +1,8 @@
 """A rigid, frictionless sphere or capsule carried over a block's sharp edge: by full finite strain, and by the loop.
 
-Below a tool that is carried out the edge is bent down and out of the way, until it slips past the tool to its side at
-once. Newton's method ends there. The solver here goes on to the new equilibrium: each step lowers the energy
-of body and penalty, and a stiffness that is not positive definite is shifted until it is.
+The tool bends the edge down and outwards. At some place the edge slips past the tool to its side. Plain Newton steps
+do not converge there. Here each step lowers the energy of body and penalty, so that the steps lead to the next
+equilibrium. A stiffness that is not positive definite is shifted until it is.
 """
 
 from __future__ import annotations
@@ -19,11 +19,12 @@ from scipy import sparse
 import palpate
 from benches.output import Table
 from benches.strain.materials import Material, NeoHookean
-from benches.strain.solid import PENALTY, DivergedError, PyPardisoSolver, Solid
+from benches.strain.solid import DivergedError, Solid, invariants, solved_with_inertia
 from palpate import TetMesh
 from palpate.scene import BuiltScene, Scene
 from palpate.validation.verify.benchmark import quiet_body
 from palpate.validation.verify.contact.loop import UNLIMITED
+from palpate.validation.verify.contact.measures import given_out
 from palpate.validation.verify.contact.reference import graded
 from palpate.validation.verify.grids import lattice, mapped
 
@@ -90,9 +91,8 @@ class Carried:
     @property
     def lost(self) -> float:
         """What the hand has not got back at the end, over the most that it had put in."""
-        mean = 0.5 * (self.forces[1:] + self.forces[:-1])
-        put_in = np.append(0.0, np.cumsum(-np.einsum("tc,tc->t", mean, np.diff(self.path, axis=0))))
-        return float(put_in[-1] / put_in.max())
+        given, put_in = given_out(self.path[None], self.forces[None])
+        return float(-given[0] / put_in[0])
 
 
 @dataclass(frozen=True)
@@ -169,20 +169,14 @@ class EdgedBlock(Solid):
         forces = [2.0 * self.press(centre, self._tool.radius, UPDATES) * [1.0, 0.0, 1.0] for centre in path]
         return Carried(path, np.array(forces))
 
-    def _pressed(self, centre: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        offset = self._offset(centre)
+    def _offset(self, centre: np.ndarray) -> np.ndarray:
+        offset = super()._offset(centre)
         offset[..., 0] -= np.clip(offset[..., 0], -0.5 * self._tool.length, 0.5 * self._tool.length)
-        distance = np.linalg.norm(offset, axis=2)
-        stiffness = PENALTY * self.material.youngs_modulus / radius
-        pressures = np.maximum(self._pressures + stiffness * (radius - distance), 0.0)
-        return pressures, offset / distance[..., None], distance
+        return offset
 
     def _round(self, centre: np.ndarray, faces: np.ndarray) -> np.ndarray:
-        beside = np.abs(self._offset(centre)[faces, :, 0]) < 0.5 * self._tool.length
+        beside = np.abs(super()._offset(centre)[faces, :, 0]) < 0.5 * self._tool.length
         return np.eye(3) - beside[..., None, None] * np.diag([1.0, 0.0, 0.0])
-
-    def _offset(self, centre: np.ndarray) -> np.ndarray:
-        return np.einsum("qi,kic->kqc", self._shapes, (self.mesh.nodes + self.u)[self._faces]) - centre
 
     def _balance(self, centre: np.ndarray, radius: float) -> np.ndarray:
         shift = 0.0
@@ -202,7 +196,7 @@ class EdgedBlock(Solid):
         """Take a step that lowers the energy; return the shift to begin the next one with."""
         mean, before = stiffness.diagonal().mean(), self._potential(self.u, *at)
         while shift <= MOST_SHIFT:
-            change, negative = _solved(stiffness + shift * mean * sparse.eye(len(residual)), -residual)
+            change, negative = solved_with_inertia(stiffness + shift * mean * sparse.eye(len(residual)), -residual)
             if not negative:
                 step = np.zeros(self.u.size)
                 step[self._free] = change
@@ -217,34 +211,19 @@ class EdgedBlock(Solid):
             shift = max(4.0 * shift, SHIFT)
         raise DivergedError("no step lowers the energy")
 
-    def _energy(self, u: np.ndarray) -> float:
-        f = np.eye(3) + np.einsum("eai,eqaj->eqij", u[self.mesh.tets], self._slopes)
-        j = np.linalg.det(f)
-        if not (j > 0.0).all():
-            return np.inf
-        c = np.einsum("...ki,...kj", f, f)
-        i1 = np.einsum("...ii", c)
-        i2 = 0.5 * (i1**2 - np.einsum("...ij,...ij", c, c))
-        return float(np.sum(self._weights * self.material.density(i1, i2, j).value))
-
     def _potential(self, u: np.ndarray, centre: np.ndarray, radius: float) -> float:
-        own = self._energy(u)
-        if not np.isfinite(own):
-            return own
+        """Return the energy of body and penalty, J; infinite where an element is turned over."""
+        f = np.eye(3) + np.einsum("eai,eqaj->eqij", u[self.mesh.tets], self._slopes)
+        try:
+            _, i1, i2, j = invariants(f)
+        except DivergedError:
+            return np.inf
+        own = float(np.sum(self._weights * self.material.density(i1, i2, j).value))
         kept, self.u = self.u, u
         pressures = self._pressed(centre, radius)[0]
         self.u = kept
-        stiffness = PENALTY * self.material.youngs_modulus / radius
-        return own + float(np.sum(self._areas * (pressures**2 - self._pressures**2))) / (2.0 * stiffness)
-
-
-def _solved(matrix: sparse.csc_matrix, right: np.ndarray) -> tuple[np.ndarray, int]:
-    """Solve with a symmetric matrix; also return the number of its negative eigenvalues."""
-    solver = PyPardisoSolver(mtype=-2)
-    found = solver.solve(sparse.triu(matrix, format="csr"), right)
-    negative = int(solver.get_iparm(23))
-    solver.free_memory(everything=True)
-    return found, negative
+        squares = pressures**2 - self._pressures**2
+        return own + float(np.sum(self._areas * squares)) / (2.0 * self._penalty(radius))
 
 
 def block(cell: float = CELL) -> TetMesh:

@@ -150,13 +150,19 @@ class Solid:
         return forces, sparse.csc_matrix((blocks.ravel(), (self._rows, self._columns)), (size, size))
 
     def _pressed(self, centre: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return pressures (k, q), Pa, outward normals of the sphere (k, q, 3) and distances from its centre, m."""
-        at = np.einsum("qi,kic->kqc", self._shapes, (self.mesh.nodes + self.u)[self._faces])
-        offset = at - centre
+        """Return pressures (k, q), Pa, outward normals of the tool (k, q, 3) and distances from its core, m."""
+        offset = self._offset(centre)
         distance = np.linalg.norm(offset, axis=2)
-        stiffness = PENALTY * self.material.youngs_modulus / radius
-        pressures = np.maximum(self._pressures + stiffness * (radius - distance), 0.0)
+        pressures = np.maximum(self._pressures + self._penalty(radius) * (radius - distance), 0.0)
         return pressures, offset / distance[..., None], distance
+
+    def _penalty(self, radius: float) -> float:
+        """Return the pressure over the depth, Pa/m."""
+        return PENALTY * self.material.youngs_modulus / radius
+
+    def _offset(self, centre: np.ndarray) -> np.ndarray:
+        """Return vectors (k, q, 3) from the tool's core, a sphere's centre, to the points of the faces, m."""
+        return np.einsum("qi,kic->kqc", self._shapes, (self.mesh.nodes + self.u)[self._faces]) - centre
 
     def _round(self, centre: np.ndarray, faces: np.ndarray) -> np.ndarray:
         """Return the directions in which the tool is round, as a matrix, and the normal."""
@@ -170,9 +176,8 @@ class Solid:
         np.add.at(forces, self._faces, np.einsum("kqc,qi->kic", loads, self._shapes))
         near = np.flatnonzero((pressures > 0.0).any(axis=1))
         n, p, area = normals[near], pressures[near], self._areas[near]
-        stiffness = PENALTY * self.material.youngs_modulus / radius
         along = n[..., :, None] * n[..., None, :]
-        local = (stiffness * (p > 0))[..., None, None] * along
+        local = (self._penalty(radius) * (p > 0))[..., None, None] * along
         local -= (p / distance[near])[..., None, None] * (self._round(centre, near) - along)
         blocks = np.einsum("kq,kqcd,qi,qj->kicjd", area, local, self._shapes, self._shapes, optimize=True)
         dofs = (3 * self._faces[near][:, :, None] + np.arange(3)).reshape(len(near), 18)
@@ -187,20 +192,24 @@ def _solved(matrix: sparse.csc_matrix, right: np.ndarray) -> np.ndarray:
     """Solve with a symmetric matrix, which need not be positive."""
     if PyPardisoSolver is None:
         return splu(matrix, permc_spec="MMD_AT_PLUS_A").solve(right)
+    return solved_with_inertia(matrix, right)[0]
+
+
+def solved_with_inertia(matrix: sparse.csc_matrix, right: np.ndarray) -> tuple[np.ndarray, int]:
+    """Solve with a symmetric matrix by `pypardiso`; return the number of its negative eigenvalues too."""
+    if PyPardisoSolver is None:
+        raise RuntimeError("this solution needs pypardiso: pip install 'palpate[bench]'")
     solver = PyPardisoSolver(mtype=-2)
     found = solver.solve(sparse.triu(matrix, format="csr"), right)
+    negative = int(solver.get_iparm(23))
     solver.free_memory(everything=True)
-    return found
+    return found, negative
 
 
 def _stress(material: Material, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the first Piola stress and its derivative by the deformation gradient."""
-    c = np.einsum("...ki,...kj", f, f)
-    j, inverse = np.linalg.det(f), np.linalg.inv(f)
-    if not (j > 0.0).all():
-        raise DivergedError("an element is turned over")
-    i1 = np.einsum("...ii", c)
-    i2 = 0.5 * (i1**2 - np.einsum("...ij,...ij", c, c))
+    c, i1, i2, j = invariants(f)
+    inverse = np.linalg.inv(f)
     w = material.density(i1, i2, j)
     against = np.swapaxes(inverse, -1, -2)
     gradients = [2.0 * f, 2.0 * i1[..., None, None] * f - 2.0 * f @ c, j[..., None, None] * against]
@@ -219,6 +228,22 @@ def _stress(material: Material, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         moduli += w.first[1][..., None, None, None, None] * _second_of_i2(f, c, i1)
     across = np.einsum("...ji,...lk->...ijkl", inverse, inverse) - np.einsum("...jk,...li->...ijkl", inverse, inverse)
     return stress, moduli + (w.first[2] * j)[..., None, None, None, None] * across
+
+
+def invariants(f: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return `C = F^T F`, `I1`, `I2` and `J` of deformation gradients.
+
+    Raises
+    ------
+    DivergedError
+        An element is turned over.
+
+    """
+    c, j = np.einsum("...ki,...kj", f, f), np.linalg.det(f)
+    if not (j > 0.0).all():
+        raise DivergedError("an element is turned over")
+    i1 = np.einsum("...ii", c)
+    return c, i1, 0.5 * (i1**2 - np.einsum("...ij,...ij", c, c)), j
 
 
 def _second_of_i2(f: np.ndarray, c: np.ndarray, i1: np.ndarray) -> np.ndarray:

@@ -322,6 +322,14 @@ mod tests {
     use crate::contact::smooth::DrawnSurface;
     use crate::contact::smooth::tests::{cube, near};
 
+    /// A cube and its edges for a sphere of a radius.
+    fn on_cube(radius: f64) -> (Surface, SurfaceQuery, SmoothSurface, ConvexEdges) {
+        let surface = cube();
+        let (smooth, query) = (SmoothSurface::new(&surface), SurfaceQuery::new(&surface).expect("triangles"));
+        let edges = ConvexEdges::new((&surface, &query, &smooth), radius).expect("edges");
+        (surface, query, smooth, edges)
+    }
+
     #[test]
     fn short_edges_do_not_count() {
         let (surface, smooth) = (cube(), SmoothSurface::new(&cube()));
@@ -333,9 +341,7 @@ mod tests {
     /// One foot on the top, the other on the side three halves of a radius below the edge between them.
     #[test]
     fn feet_on_both_sides_of_an_edge_belong_together_within_the_depth() {
-        let (surface, radius) = (cube(), 0.2);
-        let (smooth, query) = (SmoothSurface::new(&surface), SurfaceQuery::new(&surface).expect("triangles"));
-        let edges = ConvexEdges::new((&surface, &query, &smooth), radius).expect("edges");
+        let (surface, query, smooth, edges) = on_cube(0.2);
         let (drawn, mut near) = (DrawnSurface { surface: &surface, query: &query }, near(&smooth));
         let mut foot = |centre| smooth.foot_anywhere(drawn, centre, &mut near).expect("a foot");
         let [top, side, far] = [(0.9, 1.1), (1.1, 0.7), (0.5, 1.1)].map(|(x, z)| foot(DVec3::new(x, 0.5, z)));
@@ -349,9 +355,8 @@ mod tests {
     /// Along a way from the top over an edge to the side, near a corner, and low over the edge.
     #[test]
     fn shares_and_feet_have_continuous_derivatives() {
-        let (surface, radius) = (cube(), 0.2);
-        let (smooth, query) = (SmoothSurface::new(&surface), SurfaceQuery::new(&surface).expect("triangles"));
-        let edges = ConvexEdges::new((&surface, &query, &smooth), radius).expect("edges");
+        let radius = 0.2;
+        let (surface, query, smooth, edges) = on_cube(radius);
         let (drawn, mut near) = (DrawnSurface { surface: &surface, query: &query }, near(&smooth));
         let mut beside = |centre: DVec3| {
             let foot = smooth.foot_anywhere(drawn, centre, &mut near).expect("a foot");
@@ -386,9 +391,8 @@ mod tests {
 
     #[test]
     fn second_derivatives_are_those_of_the_share() {
-        let (surface, radius) = (cube(), 0.2);
-        let (smooth, query) = (SmoothSurface::new(&surface), SurfaceQuery::new(&surface).expect("triangles"));
-        let edges = ConvexEdges::new((&surface, &query, &smooth), radius).expect("edges");
+        let radius = 0.2;
+        let (surface, query, smooth, edges) = on_cube(radius);
         let (drawn, mut near) = (DrawnSurface { surface: &surface, query: &query }, near(&smooth));
         let mut share = |centre: DVec3| {
             let foot = smooth.foot_anywhere(drawn, centre, &mut near).expect("a foot");

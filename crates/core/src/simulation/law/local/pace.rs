@@ -49,8 +49,8 @@ impl Pace {
         }
     }
 
-    /// Whether another step follows, by the longest of the last whole steps, m. One that has diverged beside an edge goes on as a snap:
-    /// where the body's compliance changes fast a contact loses its equilibrium before its stiffness shows it.
+    /// Whether another step follows; `longest` is the longest of the last whole steps, m. Beside an edge a method that has diverged takes
+    /// the steps of a snap too: where the body's compliance changes fast, a contact loses its equilibrium before its stiffness shows it.
     pub fn goes_on(&mut self, step: usize, longest: f64, may_slip: impl FnOnce() -> bool) -> bool {
         if step + 1 >= self.steps()[0] && !self.snaps && self.has_diverged(longest) {
             self.snaps = may_slip();
