@@ -8,16 +8,17 @@
 //!
 //! for `s_i < m`. The contact's middle `x` and normal `n` are means over them, and so are all fields known at the nodes. Over a sharp
 //! edge `n_i` is the tool's own normal instead (`edge_normal`), for the mean of the sides' turns over between them. The factor
-//! `eta` excludes pieces that face away from the tool's middle, in the direction `d_i`, as the other side of a plate does. The
-//! plane of the contact is raised over `x` to the highest piece that the tool may touch. All this is a function of the tool's pose
-//! alone with exact derivatives, as long as the tool's middle has not sunk in; from then on the middle is taken as lifted along the
-//! contact's normal of the tick before.
+//! `eta` excludes pieces that face away from the tool's middle, in the direction `d_i`, as the other side of a plate does, and below
+//! a capsule's shaft those across its axis (`facing`). The plane of the contact is raised over `x` to the highest piece that the tool
+//! may touch. All this is a function of the tool's pose alone with exact derivatives, as long as the tool's middle has not sunk in;
+//! from then on the middle is taken as lifted along the contact's normal of the tick before.
 //!
 //! Heights over one plane cannot describe a floor and a wall that stands on it. A wall that rises over the plane of the previous
 //! tick is therefore flattened to that plane, completely if it is steeper than 78 degrees and not at all up to 45. It is pressed by
 //! an additional contact of the same tool, on a plane of its own. A piece belongs to the plane that it is most parallel to.
 
 mod edge_normal;
+mod facing;
 mod near;
 
 use glam::{DMat3, DVec3};
@@ -34,8 +35,6 @@ use crate::tensor::{across, outer};
 const MARGIN: [f64; 2] = [0.3, 0.75];
 /// Longest edge of a piece, over the tool's thickness.
 const PIECE: f64 = 0.4;
-/// Cosines between a piece's normal and the direction to the tool's middle from which it counts, and counts fully.
-const FACING: [f64; 2] = [-0.4, 1.0];
 /// Cosines between the normals of a rising wall and of the contact's plane from which the wall belongs to the contact, and belongs
 /// fully.
 const SAME_CONTACT: [f64; 2] = [0.2, 0.7];
@@ -55,8 +54,10 @@ const LEAST_COMMON_NORMAL: f64 = 0.05;
 const DISTANCE_SLOPE: f64 = 4.0;
 /// Largest cosine between a piece's normal and the motion of the tool, which does not come through the body.
 const MOTION_COSINE: f64 = 0.5;
-/// Least cosine between a piece's normal and the direction to the tool for a contact to begin there.
+/// Least cosine between a piece's normal and the direction to the tool for a contact to begin there; least share to which a wall faces
+/// the tool.
 const LEAST_FACING: f64 = 0.2;
+const LEAST_FACING_WALL: f64 = 0.394;
 
 /// A surface for tools that are not spheres.
 pub struct PressedSurface {
@@ -170,7 +171,7 @@ impl FootprintScratch {
     /// with both its ends in a flat valley.
     pub fn wall_beside(&self, pressed: &Plane, thickness: f64) -> Option<Plane> {
         let margin = self.near.margin;
-        let faces = |near: &&NearPiece| near.facing_cosine > LEAST_FACING;
+        let faces = |near: &&NearPiece| near.facing > LEAST_FACING_WALL;
         let stands_on = |near: &NearPiece, plane: &Plane| near.share_of_wall(plane, &[], margin) > WALL_SHARE;
         let stands_on_others = |near: &&NearPiece| self.others.iter().flatten().all(|plane| stands_on(near, plane));
         let within = self.near.pieces.iter().filter(|near| stands_on(near, pressed));
@@ -332,12 +333,13 @@ impl NearPiece {
         if nearness <= 0.0 {
             return None;
         }
-        let (eta, rise) = smooth_step(self.facing_cosine, FACING);
+        let eta = self.facing;
         if eta <= 0.0 {
             return None;
         }
-        let (by_distance, by_facing) = (-2.0 * nearness * eta / margin, nearness * nearness * rise);
-        let by_pose = |k: usize| (self.by_pose[k] * by_distance + self.facing_cosine_by[k] * by_facing) * self.area;
+        let by_distance = -2.0 * nearness * eta / margin;
+        let by_pose =
+            |k: usize| (self.by_pose[k] * by_distance + self.facing_by[k] * (nearness * nearness)) * self.area;
         let by = [by_pose(0), by_pose(1)];
         let whole = self.area * nearness * nearness * eta;
         let share = self.contact_share;

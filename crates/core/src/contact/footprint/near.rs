@@ -19,8 +19,6 @@ const HEADROOM_SLOPE: f64 = 2.0;
 const UNLIFTED_DEPTH: f64 = 0.5;
 /// Radius of a ball around a triangle that its pieces do not leave by rounding.
 const BALL_ROUNDING: f64 = 1.0 + 1e-9;
-/// Next to the viewpoint directions are blurred over this part of the tool's thickness.
-const BLUR: f64 = 0.1;
 
 /// A tool's shape at a pose over a surface.
 #[derive(Clone, Copy)]
@@ -61,10 +59,10 @@ pub struct NearPiece {
     pub by_pose: [DVec3; 2],
     /// The tool's own normal, from the piece towards the tool, as of the latest search until its derivatives have been found.
     pub tool_normal: DVec3,
-    /// Cosine between the normal and the direction to the tool's viewpoint.
-    pub facing_cosine: f64,
+    /// Share to which it faces the tool.
+    pub facing: f64,
     /// Its derivatives by the tool's position and rotation.
-    pub facing_cosine_by: [DVec3; 2],
+    pub facing_by: [DVec3; 2],
 }
 
 /// The pieces near a tool.
@@ -136,16 +134,6 @@ impl PlacedShape<'_> {
     fn viewpoint(&self, centre: DVec3) -> DVec3 {
         let half = (centre - self.support(-self.contact_normal)).dot(self.contact_normal);
         centre + self.contact_normal * (self.penetration - UNLIFTED_DEPTH * half).max(0.0)
-    }
-
-    /// Cosine between a normal and the direction to the viewpoint, and its derivatives by position and rotation.
-    fn cosine_to_viewpoint(&self, (point, normal): (DVec3, DVec3), viewpoint: DVec3) -> (f64, [DVec3; 2]) {
-        let towards = viewpoint - point;
-        let blur = BLUR * self.shape.thickness();
-        let inverse = 1.0 / (towards.length_squared() + blur * blur).sqrt();
-        let cosine = normal.dot(towards) * inverse;
-        let gradient = (normal - towards * (cosine * inverse)) * inverse;
-        (cosine, [gradient, (viewpoint - self.position).cross(gradient)])
     }
 
     /// Distance of a point from the tool, its derivatives by position and rotation, and the tool's normal there, from the point
@@ -226,7 +214,7 @@ impl NearPieces {
         }
         for near in self.pieces.iter_mut().chain(&mut self.opposite) {
             near.distance += near.by_pose[0].dot(displacement);
-            near.facing_cosine += near.facing_cosine_by[0].dot(displacement);
+            near.facing += near.facing_by[0].dot(displacement);
         }
     }
 
@@ -309,7 +297,7 @@ impl View<'_> {
         if distance.is_nan() || distance >= size + margin {
             return None;
         }
-        let (facing_cosine, facing_cosine_by) = self.tool.cosine_to_viewpoint((middle, normal), self.viewpoint);
+        let (facing, facing_by) = self.tool.facing((middle, normal), self.viewpoint);
         Some(NearPiece {
             piece,
             corners: fine.corners(piece),
@@ -321,8 +309,8 @@ impl View<'_> {
             distance,
             by_pose,
             tool_normal,
-            facing_cosine,
-            facing_cosine_by,
+            facing,
+            facing_by,
         })
     }
 }

@@ -80,6 +80,23 @@ const SUBSTEP: f64 = 0.25;
 /// Most substeps for a tool that is not a sphere.
 const MOST_SUBSTEPS: f64 = 8.0;
 
+/// Where a contact may begin.
+struct Start {
+    foot: FootPoint,
+    /// Depth of the tool in the surface, m.
+    depth: f64,
+    /// Depth of the tool below the plane of the contact, m. For a tool that is no sphere the plane is as high as the highest piece
+    /// next to the tool.
+    plane_depth: f64,
+}
+
+impl Start {
+    /// Of a sphere.
+    fn of((foot, depth): (FootPoint, f64)) -> Self {
+        Self { foot, depth, plane_depth: depth }
+    }
+}
+
 /// The foot of a sphere that arrives at a position over the surface at rest, and its depth below the plane through the foot, m.
 /// Once the sphere touches on its way, the foot is followed, so that it lies on the side that the sphere came from. `None` if it is
 /// too far away to touch.
@@ -137,8 +154,8 @@ fn first_foot(
     Some((foot, tool.radius - foot.distance))
 }
 
-/// The footprint, as a foot, of a tool that is not a sphere, and its depth in the pieces below, m. Where no piece is near, what the
-/// next contact begins from: a tool far inside the body, as one may start, has not come in through the surface.
+/// The footprint, as a foot, of a tool that is not a sphere, and its depth in the pieces below. Where no piece is near, what the next
+/// contact begins from: a tool far inside the body, as one may start, has not come in through the surface.
 ///
 /// The contact lies on the side that the tool came from: at the first piece that it was near to on its way.
 fn starting_footprint(
@@ -147,7 +164,7 @@ fn starting_footprint(
     pressed: &PressedSurface,
     place: DVec3,
     weight_scratch: &mut WeightScratch,
-) -> Result<(FootPoint, f64), EntryDepth> {
+) -> Result<Start, EntryDepth> {
     let (body, shape) = (approach.body, &approach.tool.shape);
     let (drawn, rotation, thickness) = (body.drawn(), DMat3::from_quat(approach.orientation), shape.thickness());
     let Some(closest) = body.closest(place + rotation * shape.centre()) else { return Err(EntryDepth::default()) };
@@ -177,8 +194,10 @@ fn starting_footprint(
     let found = footprint.find(&at, (&pressed.fine, &local.smooth), first_plane, weights);
     let contact_footprint = found.ok_or(nowhere)?;
     let faces = |near: &&NearPiece| near.normal.dot(contact_footprint.normal) > 0.0;
-    let deepest = footprint.near.pieces.iter().filter(faces).map(|near| -near.distance).fold(0.0, f64::max);
-    Ok((contact_footprint.foot(place), deepest))
+    let depth = footprint.near.pieces.iter().filter(faces).map(|near| -near.distance).fold(0.0, f64::max);
+    let foot = contact_footprint.foot(place);
+    let highest = FootPoint { position: contact_footprint.origin, ..foot };
+    Ok(Start { foot, depth, plane_depth: depth_below(shape, (place, rotation), &highest) })
 }
 
 /// Depth of a tool at `place` below the plane through a foot, m; negative above it.
@@ -222,9 +241,10 @@ impl Law for Local {
         let start = match approach.pressed_surface {
             Some(pressed) => starting_footprint(approach, local, pressed, relative_position, weight_scratch),
             None => starting_foot(approach, local, relative_position, &mut weight_scratch.near)
+                .map(Start::of)
                 .ok_or_else(EntryDepth::default),
         };
-        let (foot, depth) = match start {
+        let Start { foot, depth, plane_depth } = match start {
             Ok(start) => start,
             Err(nowhere) => {
                 *entry = nowhere;
@@ -245,14 +265,7 @@ impl Law for Local {
         if depth <= entry.threshold && !starts_near {
             return Ok(None);
         }
-        // A tool that is no sphere is deeper below the plane of its contact than in the pieces around it.
-        let entry_depth = match approach.pressed_surface {
-            Some(_) if entry.threshold > 0.0 => {
-                let pose = (relative_position, DMat3::from_quat(approach.orientation));
-                depth_below(&approach.tool.shape, pose, &foot) - (depth - entry.threshold)
-            }
-            _ => entry.threshold,
-        };
+        let entry_depth = if entry.threshold > 0.0 { plane_depth - (depth - entry.threshold) } else { 0.0 };
         let local = LocalContact {
             tool_position: approach.position,
             orientation: approach.orientation,
