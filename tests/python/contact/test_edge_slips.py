@@ -71,7 +71,10 @@ class FullSolution:
 
 FULL = {
     "sphere, 1 R": FullSolution(
-        *(6e-3, 0.0, 1.0, 0.010),
+        radius=6e-3,
+        length=0.0,
+        depth=1.0,
+        inside=0.010,
         places=[-6.12e-3, -3.21e-3, 1.16e-3, 3.10e-3],
         forces=[[0.041, 0.414], [0.061, 0.361], [0.171, 0.049], [0.082, 0.019]],
         slip=[0.7e-3, 1.2e-3],
@@ -79,7 +82,10 @@ FULL = {
         off=1.05,
     ),
     "sphere, 1.5 R": FullSolution(
-        *(6e-3, 0.0, 1.5, 0.010),
+        radius=6e-3,
+        length=0.0,
+        depth=1.5,
+        inside=0.010,
         places=[-6e-3, -4e-3, 0.0, 3e-3],
         forces=[[0.103, 0.706], [0.132, 0.651], [0.291, 0.047], [0.115, 0.011]],
         slip=[-1.0e-3, -0.5e-3],
@@ -87,7 +93,10 @@ FULL = {
         off=1.05,
     ),
     "capsule, 1.5 R": FullSolution(
-        *(3e-3, 0.018, 1.5, 0.015),
+        radius=3e-3,
+        length=0.018,
+        depth=1.5,
+        inside=0.015,
         places=[-8e-3, -5.5e-3, 2.5e-3, 10e-3],
         forces=[[0.045, 0.484], [0.045, 0.431], [0.044, 0.265], [0.047, 0.006]],
         slip=[8.5e-3, 9.0e-3],

@@ -7,7 +7,7 @@
 
 use glam::DVec3;
 
-use super::{PlacedShape, smooth_step};
+use super::{PlacedShape, Weight, smooth_step};
 use crate::contact::shape::ToolShape;
 
 /// Cosines between a piece's normal and the direction to the tool's middle from which it faces the tool, and faces it fully.
@@ -19,12 +19,9 @@ const ALONG_AXIS: [f64; 2] = [0.5, 0.9];
 /// Next to the point that is faced, directions are blurred over this part of the tool's thickness.
 const BLUR: f64 = 0.1;
 
-/// A share, and its derivatives by the tool's position and its rotation about its origin.
-pub type Share = (f64, [DVec3; 2]);
-
 impl PlacedShape<'_> {
     /// Share to which a piece at a point with a normal faces the tool, whose middle counts as lying at `middle`.
-    pub(super) fn facing(&self, (point, normal): (DVec3, DVec3), middle: DVec3) -> Share {
+    pub(super) fn facing(&self, (point, normal): (DVec3, DVec3), middle: DVec3) -> Weight {
         let (share, gradient) = self.facing_point((point, normal), middle, FACING_MIDDLE);
         let by = [gradient, (middle - self.position).cross(gradient)];
         let ToolShape::Capsule { half_length, .. } = *self.shape else { return (share, by) };
@@ -32,13 +29,18 @@ impl PlacedShape<'_> {
         (share * factor, [0, 1].map(|k| by[k] * factor + factor_by[k] * share))
     }
 
-    /// Factor of the share for a capsule: one for a piece across the axis, and the share to which a piece along it faces the nearest
-    /// point of the axis.
+    /// Factor of the share for a capsule: the share to which a piece whose normal is along the axis faces the nearest point of the axis,
+    /// and one where the normal is across it.
     ///
     /// Over the shaft that point `v` slides along the axis `a`, so that `t = v - point` stays across it. With the gradient `g` of the
     /// share by `t`, and the projection `P` across `a`, the derivatives are `P g` and `(v - position) x P g - (g . a) (a x t)`.
-    fn facing_axis(&self, (point, normal): (DVec3, DVec3), middle: DVec3, half_length: f64) -> Share {
+    fn facing_axis(&self, (point, normal): (DVec3, DVec3), middle: DVec3, half_length: f64) -> Weight {
         let axis = self.rotation.z_axis;
+        let cosine = normal.dot(axis);
+        let (must, rise) = smooth_step(cosine.abs(), ALONG_AXIS);
+        if must <= 0.0 {
+            return (1.0, [DVec3::ZERO; 2]);
+        }
         let along = (point - middle).dot(axis);
         let nearest = middle + axis * along.clamp(-half_length, half_length);
         let (share, gradient) = self.facing_point((point, normal), nearest, FACING_AXIS);
@@ -49,8 +51,6 @@ impl PlacedShape<'_> {
         } else {
             [gradient, arm.cross(gradient)]
         };
-        let cosine = normal.dot(axis);
-        let (must, rise) = smooth_step(cosine.abs(), ALONG_AXIS);
         let by_turn = axis.cross(normal) * (cosine.signum() * rise * (share - 1.0));
         (1.0 + must * (share - 1.0), [by[0] * must, by[1] * must + by_turn])
     }

@@ -9,7 +9,7 @@
 //! for `s_i < m`. The contact's middle `x` and normal `n` are means over them, and so are all fields known at the nodes. Over a sharp
 //! edge `n_i` is the tool's own normal instead (`edge_normal`), for the mean of the sides' turns over between them. The factor
 //! `eta` excludes pieces that face away from the tool's middle, in the direction `d_i`, as the other side of a plate does, and below
-//! a capsule's shaft those across its axis (`facing`). The plane of the contact is raised over `x` to the highest piece that the tool
+//! a capsule's shaft those whose normal is along its axis (`facing`). The plane of the contact is raised over `x` to the highest piece that the tool
 //! may touch. All this is a function of the tool's pose alone with exact derivatives, as long as the tool's middle has not sunk in;
 //! from then on the middle is taken as lifted along the contact's normal of the tick before.
 //!
@@ -54,9 +54,9 @@ const LEAST_COMMON_NORMAL: f64 = 0.05;
 const DISTANCE_SLOPE: f64 = 4.0;
 /// Largest cosine between a piece's normal and the motion of the tool, which does not come through the body.
 const MOTION_COSINE: f64 = 0.5;
-/// Least cosine between a piece's normal and the direction to the tool for a contact to begin there; least share to which a wall faces
-/// the tool.
+/// Least cosine between a piece's normal and the direction to the tool for a contact to begin there.
 const LEAST_FACING: f64 = 0.2;
+/// Least share to which a wall faces the tool: that of about the same cosine to the tool's middle.
 const LEAST_FACING_WALL: f64 = 0.394;
 
 /// A surface for tools that are not spheres.
@@ -119,7 +119,7 @@ struct MeanNormal {
     by: [DMat3; 2],
 }
 
-/// Weight of a piece, and its derivatives by the tool's position and rotation.
+/// Weight or share of a piece, and its derivatives by the tool's position and rotation.
 type Weight = (f64, [DVec3; 2]);
 
 /// Sums over pieces; positions are relative to the tool's middle.
