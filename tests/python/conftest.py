@@ -59,11 +59,12 @@ def pytest_runtest_protocol(item):
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item):
-    """Close the browser before the first test that needs none: its event loop is that of the thread, and no other can
-    run, and its program computes a thousand ticks a second.
+    """Close the shared browser before the first test that needs none or starts its own: its event loop is that of the
+    thread, and no other can run, and its program computes a thousand ticks a second.
     """
     shared = item.config.stash.get(SHARED_BROWSER, None)
-    if shared is not None and not item.get_closest_marker("browser"):
+    marker = item.get_closest_marker("browser")
+    if shared is not None and (marker is None or marker.kwargs.get("own", False)):
         shared.close()
 
 

@@ -247,7 +247,7 @@ def test_this_machine_is_examined(monkeypatch, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.browser
+@pytest.mark.browser(own=True)
 @pytest.mark.skipif(shutil.which("chromium") is None, reason="no Chromium (Debian: apt install chromium)")
 def test_the_page_is_served_and_drawn(monkeypatch):
     from palpate.validation.doctor import measure
