@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -16,8 +16,11 @@ from palpate.mesh.shape_functions import values
 CANDIDATES = 60
 
 
-def refined(mesh: palpate.TetMesh, place: np.ndarray, reaches: Sequence[float]) -> palpate.TetMesh:
-    """Halve the edges of elements whose middles lie within each of some distances of a place, m, one after the other.
+def refined(mesh: palpate.TetMesh, place: np.ndarray, longest: Callable[[np.ndarray], np.ndarray]) -> palpate.TetMesh:
+    """Divide elements until none is longer than it may be at its distance from a place, m.
+
+    ``longest`` gives edges (m,), m, at distances (m,) of the nearest corners. The length of an element is the edge of
+    the regular tetrahedron with its volume.
 
     scikit-fem divides the elements with straight edges. Each new node has then its place in an element of the mesh as
     given, whose shape functions carry it onto the curved one: quadratic in the parent is quadratic in its parts.
@@ -28,9 +31,14 @@ def refined(mesh: palpate.TetMesh, place: np.ndarray, reaches: Sequence[float]) 
     logging.getLogger("skfem").setLevel(logging.ERROR)
     corners, ranks = np.unique(mesh.tets[:, :4], return_inverse=True)
     divided = skfem.MeshTet(mesh.nodes[corners].T.copy(), ranks.reshape(-1, 4).T.copy())
-    for reach in reaches:
-        middles = divided.p[:, divided.t].mean(axis=1).T
-        divided = divided.refined(np.flatnonzero(np.linalg.norm(middles - place, axis=1) < reach))
+    while True:
+        a, b, c, d = (divided.p[:, corner].T for corner in divided.t)
+        length = np.cbrt(np.sqrt(2.0) * np.abs(np.einsum("ni,ni->n", np.cross(b - a, c - a), d - a)))
+        distance = np.min([np.linalg.norm(corner - place, axis=1) for corner in (a, b, c, d)], axis=0)
+        too_long = np.flatnonzero(length > longest(distance))
+        if len(too_long) == 0:
+            break
+        divided = divided.refined(too_long)
     straight = palpate.TetMesh(divided.p.T, divided.t.T).to_quadratic()
     return palpate.TetMesh(_curved(mesh, straight.nodes), straight.tets)
 

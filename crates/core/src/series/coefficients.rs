@@ -133,7 +133,7 @@ fn softest([second, third]: [f64; 2]) -> f64 {
 }
 
 /// From 0 to 1 between two values.
-fn rise(x: f64, [low, high]: [f64; 2]) -> f64 {
+pub(super) fn rise(x: f64, [low, high]: [f64; 2]) -> f64 {
     ((x - low) / (high - low)).clamp(0.0, 1.0)
 }
 
