@@ -17,12 +17,12 @@ use crate::contact::{PatchGeometry, PatchScratch, SeriesFields, centre_of, wide_
 use crate::green::{Problem, spatial_order};
 use crate::mesh::{Surface, node_elements};
 
-/// Radius of the patch over the tool's, on a flat surface and on a convex one, and over the thickness of the body below it. A patch that
+/// Radius of the patch over the tool's, and over the thickness of the body below it, on a flat surface and on a convex one. A patch that
 /// is cut off by the sides of a column has no half-space below it: with three radii the force on a column of 2.5 radii was 14 % off,
 /// with 7.5 it is within 2 %. Where the sides are farther away both agree. On a convex surface a wide patch carries a whole lobe, which
 /// then hardly bends: beside a rim of the liver the force was 9 % too high at one radius.
-const RADII: [f64; 2] = [7.5, 2.0];
-const THICKNESSES: f64 = 1.5;
+const RADII: [f64; 2] = [7.5, 2.5];
+const THICKNESSES: [f64; 2] = [1.5, 0.65];
 /// Curvature times the tool's radius from which a surface counts as convex, and fully so, and radius over the tool's, and over the
 /// elements, within which it is a mean.
 const CONVEX: [f64; 2] = [0.02, 0.1];
@@ -70,8 +70,10 @@ impl SeriesPlan {
                 |width: f64| wide_patch_weights(&surface, &geometry, &centre_of(&surface, at), width, scratch);
             let around = patch_of((AROUND[0] * radius).max(AROUND[1] * at.spacing));
             let convex = rise(radius * curvature(&surface, at, &around), CONVEX);
-            let radii = RADII[0] + (RADII[1] - RADII[0]) * convex;
-            let width = (radii * radius).min(THICKNESSES * thickness(&surface, at));
+            let [radii, thicknesses] = [RADII, THICKNESSES].map(|[flat, round]| flat + (round - flat) * convex);
+            let thickness = thickness(&surface, at);
+            let width = (radii * radius).min(thicknesses * thickness).max(LEAST_RADII * radius);
+            let width = width.min(THICKNESSES[0] * thickness);
             let patch = patch_of(width);
             let weights: Vec<_> = patch.iter().map(|&(node, w)| (problem.surface_nodes[node as usize], w)).collect();
             let is_known = width >= LEAST_RADII * radius && !weights.is_empty();
