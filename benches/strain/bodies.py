@@ -27,9 +27,9 @@ MODULUS, POISSON = 10e3, 0.45
 SOLVED = Path(__file__).with_name("solid_forces.json")
 # Edges of elements below the sphere, m, and distance up to which they are that fine.
 CELL, FINE = 0.004, 0.012
-# Longest edges of the liver's elements below the sphere, m, how fast they grow with the distance, and from which
-# distance on, m. With edges of 4.6 mm full solutions scatter by 4 % from one depth to the next.
-LIVER_EDGE, LIVER_GROWTH, LIVER_FINE = 0.0021, 0.9, 0.008
+# Longest edges of the liver's elements below the sphere, and distance up to which they are that fine, m. With edges of
+# 4.6 mm full solutions scatter by 4 % from one depth to the next.
+LIVER_EDGE, LIVER_FINE = 0.0021, 0.008
 
 
 @dataclass(frozen=True)
@@ -160,7 +160,7 @@ def liver(places: int) -> Iterator[Pressed]:
     depths = np.array([0.005, 0.01, 0.015])
     for node in rng.choice(upper, places, replace=False):
         place, normal = mesh.nodes[node], normals[node]
-        finer = refined(mesh, place, lambda r: LIVER_EDGE + LIVER_GROWTH * np.maximum(0.0, r - LIVER_FINE))
+        finer = refined(mesh, place, LIVER_EDGE, LIVER_FINE)
         case = Pressed(f"liver, node {node}", finer, _lying(finer), place, normal, depths)
         yield case
         yield replace(case, name=f"{case.name}, own elements", mesh=mesh, held=_lying(mesh), forces=case.full())

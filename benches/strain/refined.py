@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 import palpate
-from palpate.mesh.elements import EDGES
+from palpate.mesh.elements import EDGES, corner_volumes
 from palpate.mesh.shape_functions import values
 
 # Elements in which a point is looked for, by the distance of their middles.
 CANDIDATES = 60
+# How fast the longest edge grows with the distance.
+GROWTH = 0.9
 
 
-def refined(mesh: palpate.TetMesh, place: np.ndarray, longest: Callable[[np.ndarray], np.ndarray]) -> palpate.TetMesh:
-    """Divide elements until none is longer than it may be at its distance from a place, m.
+def refined(mesh: palpate.TetMesh, place: np.ndarray, edge: float, within: float) -> palpate.TetMesh:
+    """Divide elements until none within a distance of a place is longer than an edge, m, and those beyond it not much.
 
-    ``longest`` gives edges (m,), m, at distances (m,) of the nearest corners. The length of an element is the edge of
-    the regular tetrahedron with its volume.
+    The length of an element is the edge of the regular tetrahedron with its volume, and its distance that of the
+    nearest corner.
 
     scikit-fem divides the elements with straight edges. Each new node has then its place in an element of the mesh as
     given, whose shape functions carry it onto the curved one: quadratic in the parent is quadratic in its parts.
@@ -32,10 +33,10 @@ def refined(mesh: palpate.TetMesh, place: np.ndarray, longest: Callable[[np.ndar
     corners, ranks = np.unique(mesh.tets[:, :4], return_inverse=True)
     divided = skfem.MeshTet(mesh.nodes[corners].T.copy(), ranks.reshape(-1, 4).T.copy())
     while True:
-        a, b, c, d = (divided.p[:, corner].T for corner in divided.t)
-        length = np.cbrt(np.sqrt(2.0) * np.abs(np.einsum("ni,ni->n", np.cross(b - a, c - a), d - a)))
-        distance = np.min([np.linalg.norm(corner - place, axis=1) for corner in (a, b, c, d)], axis=0)
-        too_long = np.flatnonzero(length > longest(distance))
+        nodes, tets = divided.p.T, divided.t.T
+        length = np.cbrt(6.0 * np.sqrt(2.0) * np.abs(corner_volumes(nodes, tets)))
+        distance = np.linalg.norm(nodes - place, axis=1)[tets].min(axis=1)
+        too_long = np.flatnonzero(length > edge + GROWTH * np.maximum(0.0, distance - within))
         if len(too_long) == 0:
             break
         divided = divided.refined(too_long)

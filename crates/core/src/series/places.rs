@@ -70,10 +70,7 @@ impl SeriesPlan {
                 |width: f64| wide_patch_weights(&surface, &geometry, &centre_of(&surface, at), width, scratch);
             let around = patch_of((AROUND[0] * radius).max(AROUND[1] * at.spacing));
             let convex = rise(radius * curvature(&surface, at, &around), CONVEX);
-            let [radii, thicknesses] = [RADII, THICKNESSES].map(|[flat, round]| flat + (round - flat) * convex);
-            let thickness = thickness(&surface, at);
-            let width = (radii * radius).min(thicknesses * thickness).max(LEAST_RADII * radius);
-            let width = width.min(THICKNESSES[0] * thickness);
+            let width = patch_width(radius, thickness(&surface, at), convex);
             let patch = patch_of(width);
             let weights: Vec<_> = patch.iter().map(|&(node, w)| (problem.surface_nodes[node as usize], w)).collect();
             let is_known = width >= LEAST_RADII * radius && !weights.is_empty();
@@ -149,6 +146,13 @@ fn spread(fans: &[Fan], spacing: f64, within: impl Fn(&Fan) -> bool) -> Vec<usiz
         }
     }
     chosen
+}
+
+/// Radius of the patch on a surface that is `convex` in part, m. Convexity alone leaves no place without a series.
+fn patch_width(radius: f64, thickness: f64, convex: f64) -> f64 {
+    let [radii, thicknesses] = [RADII, THICKNESSES].map(|[flat, round]| flat + (round - flat) * convex);
+    let width = (radii * radius).min(thicknesses * thickness);
+    width.max(LEAST_RADII * radius).min(THICKNESSES[0] * thickness)
 }
 
 /// Mean curvature of a surface over nodes around a fan and their weights, 1/m, positive where it is convex: that of the paraboloid as
