@@ -18,8 +18,8 @@ from scipy.sparse.linalg import splu
 from benches.strain.axisymmetric import Cylinder, graded
 from benches.strain.materials import Material, NeoHookean, ReducedPolynomial, shear_modulus
 
-# Orders from 0 on; the third order of the displacement needs the third of the stress.
-ORDERS = 4
+# Orders from 0 on; the fourth order of the displacement needs the fourth of the stress.
+ORDERS = 5
 # Size of elements below the patch over its radius, growth outwards, radius and height of the cylinder over that of the
 # patch.
 FINE, GROWTH, EXTENT = 1 / 10, 1.35, 3000.0
@@ -27,7 +27,7 @@ Series = list[np.ndarray]
 
 
 def half_space_terms(material: Material) -> np.ndarray:
-    """Return `h_1`, `h_2` and `h_3` of a material of `E = 1`."""
+    """Return `h_1` to `h_4` of a material of `E = 1`."""
     r, z = graded(FINE, 1.5, GROWTH, EXTENT), graded(FINE, 1.0, GROWTH, EXTENT)
     cylinder = Cylinder(r, -z, material)
     load = patch_weights(cylinder)

@@ -6,6 +6,8 @@ import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from benches.strain.materials import NeoHookean, ReducedPolynomial
 from benches.strain.patch_series import half_space_terms
 
@@ -13,21 +15,29 @@ RATIOS = (0.0, 0.1, 0.2, 0.3, 0.35, 0.4, 0.45, 0.49, 0.499)
 SOURCE = Path(__file__).parents[2] / "crates/core/src/series/half_space_table.rs"
 
 
+# `x = c01 / (c10 + c01)` and `y = c20 / c10`.
+SHARES, QUADRATIC = (0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0), 1.0
+
+
 def neo_hookean_row(nu: float) -> list[float]:
-    """Return `h_2` and `h_3`."""
+    """Return `h_2`, `h_3` and `h_4`."""
     return half_space_terms(NeoHookean(1.0, nu))[1:].tolist()
 
 
 def polynomial_row(nu: float) -> list[float]:
-    """Return `h_2 = a + b x` and `h_3 = c + d x + e x^2 + f y` as (a, b, c, d, e, f).
+    """Return `h_k` of `k` from 2 to 4, each as the coefficients of 1, x, .., x^(k - 1); the last number is that of y.
 
-    Here `x = c01 / (c10 + c01)` and `y = c20 / c10`; the order of each term in the strain leaves no others.
+    The order of each term of the energy in the strain leaves no others; `h_2` has no y.
     """
-    at = {x: half_space_terms(ReducedPolynomial(1.0, nu, x)) for x in (0.0, 0.5, 1.0)}
-    stiffer = half_space_terms(ReducedPolynomial(1.0, nu, 0.0, 1.0))
-    start, middle, end = (at[x][2] for x in (0.0, 0.5, 1.0))
-    straight, square = 4.0 * middle - end - 3.0 * start, 2.0 * (end - 2.0 * middle + start)
-    return [at[0.0][1], at[1.0][1] - at[0.0][1], start, straight, square, stiffer[2] - start]
+    at = np.array([half_space_terms(ReducedPolynomial(1.0, nu, x)) for x in SHARES])
+    stiffer = half_space_terms(ReducedPolynomial(1.0, nu, 0.0, QUADRATIC))
+    row = []
+    for order in (2, 3, 4):
+        powers = np.linalg.lstsq(np.vander(SHARES, order, increasing=True), at[:, order - 1], rcond=None)[0]
+        row += powers.tolist()
+        if order > 2:
+            row.append((stiffer[order - 1] - at[0, order - 1]) / QUADRATIC)
+    return row
 
 
 def _rust(name: str, meaning: str, rows: Sequence[Sequence[float]]) -> list[str]:
@@ -45,10 +55,11 @@ def patch_table() -> None:
         "",
         "/// Poisson's ratios.",
         f"pub const RATIOS: [f64; {len(RATIOS)}] = {list(RATIOS)};",
-        *_rust("NEO_HOOKEAN", "`h_2` and `h_3` by Poisson's ratio", [neo_hookean_row(nu) for nu in RATIOS]),
+        *_rust("NEO_HOOKEAN", "`h_2`, `h_3` and `h_4` by Poisson's ratio", [neo_hookean_row(nu) for nu in RATIOS]),
         *_rust(
             "POLYNOMIAL",
-            "Polynomial, `x = c01/(c10 + c01)`, `y = c20/c10`: `h_2 = a + b x`, `h_3 = c + d x + e x^2 + f y`",
+            "Polynomial, `x = c01/(c10 + c01)`, `y = c20/c10`: factors of 1, x in `h_2`, of 1, x, x^2, y in `h_3`, "
+            "of 1, x, x^2, x^3, y in `h_4`",
             [polynomial_row(nu) for nu in RATIOS],
         ),
     ]

@@ -28,7 +28,7 @@ from palpate.scene.tables import SceneTables
 from palpate.simulation.native import body_arguments, core_of, largest_force, needs_moduli, tool_arguments
 
 # Format of the folder; crates/scene reads it.
-FORMAT, VERSION = "palpate-scene", 2
+FORMAT, VERSION = "palpate-scene", 3
 SCENE_FILE = "scene.json"
 _TYPES = {"f8": "F64", "u4": "U32", "u8": "U64"}
 

@@ -38,7 +38,7 @@ pub struct SeriesAt {
     pub displacements: [DVec3; 3],
     /// `U_5` of 1 N, J/N^5.
     pub fifth: f64,
-    /// `U_6` (J/N^6) and `U_7` (J/N^7) of a body that hardens.
+    /// `U_6` (J/N^6), and `U_7` (J/N^7) of a body that hardens.
     pub last: [f64; 2],
     /// `u_1`, `u_2`, `u_3` in the middle of the patch.
     pub middle: [DVec3; 3],
@@ -82,7 +82,7 @@ impl HyperelasticBody {
             let fields = [&first[k][..], &second[k], &third[k]];
             let displacements = fields.map(|field| load.mean_displacement(field));
             let hardens = displacements[2].dot(load.direction) < 0.0;
-            let last = if hardens { elements.last_orders(fields) } else { [0.0; 2] };
+            let last = if hardens { elements.last_orders(fields) } else { [elements.sixth_order(fields), 0.0] };
             SeriesAt { displacements, fifth: fifth[k], last, middle: fields.map(|field| field[load.middle as usize]) }
         };
         loads.iter().enumerate().map(at).collect()
@@ -118,5 +118,42 @@ impl PatchLoad {
 
     fn mean_displacement(&self, field: &[DVec3]) -> DVec3 {
         self.weights.iter().map(|&(node, weight)| field[node as usize] * weight).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fem::{Isotropic, Supports};
+    use crate::mesh::TetMesh;
+    use crate::series::coefficients::coefficients;
+
+    /// One tetrahedron on a clamped base, `nu = 0`, pressed at its tip: the stretch `1 - q` is uniform, and `6 F/E = (1/(1 - q) - (1 - q))/2`.
+    /// So with `x = 6 F/E` the displacement is `q = 1 + x - sqrt(1 + x^2) = x - x^2/2 + x^4/8 - x^6/16 + ..`.
+    #[test]
+    fn a_neo_hookean_bar_has_its_closed_form() {
+        let modulus = 6.0;
+        let nodes = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+        let problem = Problem {
+            mesh: TetMesh::new(nodes, vec![[0, 1, 2, 3]]).expect("a valid mesh"),
+            materials: vec![Isotropic::new(modulus, 0.0, 1.0).expect("a valid material")],
+            supports: Supports::new(12, (0..9).collect()).expect("valid supports"),
+            surface_nodes: (0..4).collect(),
+            surface_faces: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]].into(),
+            touch: vec![3],
+            loads: Vec::new(),
+        };
+        let body =
+            HyperelasticBody::new(Arc::new(problem), Arc::new([StrainLaw::NeoHookean])).expect("a supported body");
+        let load = PatchLoad { weights: vec![(3, 1.0)], direction: -DVec3::Z, middle: 3 };
+        let [at] = body.series(&[load], &mut body.scratch(1))[..] else { panic!("one load") };
+        for (found, expected) in at.displacements.iter().zip([1.0, -0.5, 0.0]) {
+            assert!((-found.z - expected).abs() < 1e-12, "{found}");
+        }
+        // The orders four and five of the displacement.
+        assert!((5.0 * at.fifth - 0.125).abs() < 1e-12 && at.last[0].abs() < 1e-12, "{at:?}");
+        let fields = coefficients(&at, -DVec3::Z, [0.0, 0.0, 0.0, 0.025]);
+        // Less that of a half-space.
+        assert!((5.0 * fields[9] - 0.1).abs() < 1e-12, "{fields:?}");
     }
 }

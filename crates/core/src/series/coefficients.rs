@@ -5,13 +5,13 @@ use glam::DVec3;
 use super::body::SeriesAt;
 use crate::contact::SeriesFields;
 use crate::contact::regular::HALF_SPACE;
-use crate::math::{cbrt, pow};
+use crate::math::pow;
 
 /// Least part of the compliance at rest that is left where the series ends.
 const LEAST_COMPLIANCE: f64 = 0.2;
 /// Part of the energy that is left out, over `U_2`, at which the series of a body that softens ends, and that of a body that hardens:
 /// its further orders alternate.
-const LARGEST_REST: [f64; 2] = [0.01, 0.05];
+const LARGEST_REST: [f64; 2] = [0.02, 0.05];
 /// `-e_3/e_2^2` from which the orders four and five count, and from which they count fully.
 const HARD: [f64; 2] = [1.0, 2.0];
 /// The part of a patch's compliance that is not the half-space's, from which a body counts as one that bends, and fully so.
@@ -23,9 +23,9 @@ const MOST_NARROWED: f64 = 2.0;
 /// Steps to the coefficients that match the orders four and five.
 const STEPS: usize = 8;
 
-/// Coefficients from a series under a patch that is pressed along `inward`: less the displacements `half_space` (m/N, m/N^2, m/N^3) of
-/// the half-space under it, as `U_3 = F^2 b_3 . f` and `U_4 = F^3 b_4 . f`. The first is `1/(E* b)`.
-pub fn coefficients(at: &SeriesAt, inward: DVec3, half_space: [f64; 3]) -> SeriesFields {
+/// Coefficients from a series under a patch that is pressed along `inward`: less the displacements `half_space` (m/N to m/N^4) of
+/// the half-space under it, as `U_3 = F^2 b_3 . f`, `U_4 = F^3 b_4 . f` and `U_5 = F^5 beta`. The first is `1/(E* b)`.
+pub fn coefficients(at: &SeriesAt, inward: DVec3, half_space: [f64; 4]) -> SeriesFields {
     let [first, q2, q3] = at.displacements;
     let compliance = first.dot(inward);
     let bends = 1.0 - HALF_SPACE * half_space[0] / compliance;
@@ -36,7 +36,7 @@ pub fn coefficients(at: &SeriesAt, inward: DVec3, half_space: [f64; 3]) -> Serie
     let (q2, q3) = (q2 - inward * half_space[1], (q3 - inward * half_space[2]) * s3);
     let [fourth, fifth, sixth] = [5.0 * at.fifth * s4, 6.0 * at.last[0] * s5, 7.0 * at.last[1] * s6];
     let orders = [q2.dot(inward), q3.dot(inward), fourth, fifth, sixth].map(|order| order / compliance);
-    let Hardening { bending, hardening, ending } = Hardening::new(orders, bends);
+    let Hardening { bending, hardening, softening, ending } = Hardening::new(orders, bends, half_space[3] / compliance);
     // In powers of y = F - alpha F^2 + .. in place of F.
     let q3 = q3 + q2.dot(inward) * inward * (2.0 * bending);
     // The gradients of both forms at f = F inward are F^2 (b_3 + 2 (b_3 . n) n) and F^3 (b_4 + 3 (b_4 . n) n).
@@ -44,7 +44,18 @@ pub fn coefficients(at: &SeriesAt, inward: DVec3, half_space: [f64; 3]) -> Serie
     let quartic = q3 - inward * (0.75 * q3.dot(inward));
     // So far of y.
     let ending = if ending > 0.0 { ending / (1.0 + (bending + hardening / ending) / ending) } else { 0.0 };
-    let fields = [cubic.x, cubic.y, cubic.z, quartic.x, quartic.y, quartic.z, ending, hardening, bending];
+    let fields = [
+        cubic.x,
+        cubic.y,
+        cubic.z,
+        quartic.x,
+        quartic.y,
+        quartic.z,
+        ending,
+        hardening,
+        bending,
+        softening * compliance / 5.0,
+    ];
     // A place on a support is not displaced.
     if fields.iter().all(|field| field.is_finite()) { fields } else { SeriesFields::default() }
 }
@@ -62,40 +73,57 @@ fn narrowed(at: &SeriesAt, inward: DVec3, half_space: f64, bends: f64) -> [f64; 
     ratios.map(|ratio| if ratio.is_finite() { 1.0 + part * (ratio.clamp(1.0, MOST_NARROWED) - 1.0) } else { 1.0 })
 }
 
-/// How a body hardens: `F = y + alpha y^2 + kappa y^3`, where `q/c_1 = y + (e_2 + alpha) y^2 + (e_3 + 2 alpha e_2 + kappa) y^3`.
+/// How a body hardens or softens: `F = y + alpha y^2 + kappa y^3`, where
+/// `q/c_1 = y + (e_2 + alpha) y^2 + (e_3 + 2 alpha e_2 + kappa) y^3 + beta_1 y^4`.
 struct Hardening {
     /// `alpha`, 1/N.
     bending: f64,
     /// `kappa`, 1/N^2.
     hardening: f64,
+    /// `beta_1`, 1/N^3: none in a body that hardens.
+    softening: f64,
     /// One over the `y` at which the series ends, 1/N.
     ending: f64,
 }
 
 impl Hardening {
-    /// Of a body with the displacement `q = c_1 (F + e_2 F^2 + .. + e_6 F^6)`. `bends` is the part of `c_1` that the half-space lacks.
-    fn new(orders: [f64; 5], bends: f64) -> Self {
-        let first = Self::of_three(orders);
+    /// Of a body with the displacement `q = c_1 (F + e_2 F^2 + .. + e_6 F^6)`; a half-space's are taken off `e_2` and `e_3`, and `e_4`
+    /// has that of `half_space`. `bends` is the part of `c_1` that the half-space lacks.
+    fn new(orders: [f64; 5], bends: f64, half_space: f64) -> Self {
+        let first = Self::of_three(orders, half_space);
         let [second, third, ..] = orders;
         let part = rise(bends, BENDS) * if third < 0.0 { rise(-third / (second * second), HARD) } else { 0.0 };
         let Some(matched) = Self::of_five(orders).filter(|_| part > 0.0) else { return first };
         let mixed = |of: fn(&Self) -> f64| of(&first) + part * (of(&matched) - of(&first));
-        Self { bending: mixed(|x| x.bending), hardening: mixed(|x| x.hardening), ending: mixed(|x| x.ending) }
+        Self {
+            bending: mixed(|x| x.bending),
+            hardening: mixed(|x| x.hardening),
+            softening: mixed(|x| x.softening),
+            ending: mixed(|x| x.ending),
+        }
     }
 
     /// `alpha = -share e_2`, and the cubic terms cancel for `kappa = -(e_3 + 2 alpha e_2)`. Both are zero for a body that softens,
     /// `e_3 >= 0`. The share is 1 where `-e_3` is at least `e_2^2`: then the force as a function of the displacement is a cubic
-    /// polynomial, `c_1 y = q`. As `kappa >= 2 share e_2^2`, the force always grows with `y`.
-    fn of_three([second, third, fourth, ..]: [f64; 5]) -> Self {
+    /// polynomial, `c_1 y = q`. As `kappa >= 2 share e_2^2`, the force always grows with `y`. A body that softens keeps its fourth
+    /// order, as far as that is positive: a lobe of the liver that is bent away by a third of its thickness was 14 % too soft without.
+    fn of_three([second, third, fourth, fifth, _]: [f64; 5], half_space: f64) -> Self {
         let hardens = (-third).max(0.0);
         let square = second * second;
         let share = if hardens > 0.0 { (hardens / square).min(1.0) } else { 0.0 };
         let (bending, hardening) = (-share * second, hardens + 2.0 * share * square);
         let lacks = fourth + second * (bending * bending + 2.0 * hardening) + 3.0 * bending * third;
-        let rest = LARGEST_REST[0] + share * (LARGEST_REST[1] - LARGEST_REST[0]);
-        let ending =
-            cbrt((lacks / 2.5).abs() / rest).max(softest([2.0 * (1.0 - share) * second, 3.0 * third.max(0.0)]));
-        Self { bending, hardening, ending }
+        let next = fifth
+            + 2.0 * second * bending * hardening
+            + 3.0 * third * (bending * bending + hardening)
+            + 4.0 * fourth * bending;
+        let own = lacks - half_space;
+        let softening = (1.0 - share) * own.max(0.0);
+        let part = |lacks: f64, order: f64, rest: f64| pow((2.0 * lacks / order).abs() / rest, 1.0 / (order - 2.0));
+        let soft = part(own.min(0.0), 5.0, LARGEST_REST[0]).max(part(next, 6.0, LARGEST_REST[0]));
+        let hard = part(lacks, 5.0, LARGEST_REST[1]);
+        let ending = (soft + share * (hard - soft)).max(softest([2.0 * (1.0 - share) * second, 3.0 * third.max(0.0)]));
+        Self { bending, hardening, softening, ending }
     }
 
     /// The `alpha` and `kappa` that have the orders four and five too: both polynomials in `y` are then of the third degree, as of a
@@ -119,7 +147,7 @@ impl Hardening {
             + fourth * (6.0 * square + 4.0 * hardening)
             + 5.0 * bending * fifth;
         let ending = pow((lacks / 3.5).abs() / LARGEST_REST[1], 0.2);
-        Some(Self { bending, hardening, ending })
+        Some(Self { bending, hardening, softening: 0.0, ending })
     }
 }
 
@@ -139,7 +167,7 @@ pub(super) fn rise(x: f64, [low, high]: [f64; 2]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{Hardening, softest};
+    use super::{Hardening, LARGEST_REST, softest};
 
     #[test]
     fn the_series_ends_where_the_compliance_vanishes() {
@@ -178,10 +206,17 @@ mod tests {
             assert!((found.bending - a).abs() < 1e-6 && (found.hardening / k - 1.0).abs() < 1e-6, "{}", found.bending);
             assert!(found.ending < 0.1 * k.sqrt(), "{}", found.ending);
         }
-        let found = Hardening::of_three(orders([0.0, 0.0, -0.3, 5.0]));
+        let found = Hardening::of_three(orders([0.0, 0.0, -0.3, 5.0]), 0.0);
         assert!((found.bending + 0.3).abs() < 1e-14 && (found.hardening / 5.0 - 1.0).abs() < 1e-14);
-        // One that softens stays a series.
-        let soft = Hardening::new([0.3, 0.5, 0.0, 0.0, 0.0], 1.0);
-        assert_eq!([soft.bending, soft.hardening], [0.0; 2]);
+        // One that softens stays a series, with its fourth order less that of a half-space.
+        let soft = Hardening::new([0.3, 0.5, 0.5, 0.3, 0.0], 1.0, 0.1);
+        assert_eq!([soft.bending, soft.hardening, soft.softening], [0.0, 0.0, 0.4]);
+        // The part of the energy that is left out is 0.3/3 y^4.
+        assert!((soft.ending - (0.1 / LARGEST_REST[0]).powf(0.25)).abs() < 1e-12, "{}", soft.ending);
+        // A negative one is left out itself, 0.4/2.5 y^3, and so is all of it in a body that hardens.
+        let soft = Hardening::new([0.3, 0.5, -0.4, 0.0, 0.0], 1.0, 0.0);
+        assert_eq!(soft.softening, 0.0);
+        assert!((soft.ending - (0.16 / LARGEST_REST[0]).cbrt()).abs() < 1e-12, "{}", soft.ending);
+        assert_eq!(Hardening::new([0.3, -0.5, 0.4, 0.3, 0.0], 0.0, 0.0).softening, 0.0);
     }
 }

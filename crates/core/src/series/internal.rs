@@ -36,6 +36,15 @@ impl Elements<'_> {
         fifth
     }
 
+    /// `U_6` of fields `u_1`, `u_2`, `u_3`.
+    pub fn sixth_order(&self, fields: [&[DVec3]; 3]) -> f64 {
+        let mut found = 0.0;
+        self.each_stress(&[fields], |_, orders: &[DMat3; 6], [h1, h2, _], at| {
+            found -= at.weight * (contraction(&orders[5], h1) + 2.0 * contraction(&orders[4], h2)) / 6.0;
+        });
+        found
+    }
+
     /// `U_6` and `U_7` of fields `u_1`, `u_2`, `u_3`.
     pub fn last_orders(&self, fields: [&[DVec3]; 3]) -> [f64; 2] {
         let mut found = [0.0; 2];

@@ -148,6 +148,7 @@ impl Series {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact::local::SERIES_FIELDS;
 
     /// Places on a line, 1 m apart, with a fan at each and one between each pair; the fields are the place's coordinate.
     fn line(places: usize) -> Series {
@@ -159,7 +160,7 @@ mod tests {
 
     fn block(series: &Series, block: usize) -> Vec<SeriesFields> {
         let places = series.layout.places.len();
-        (BLOCK * block..places.min(BLOCK * (block + 1))).map(|k| [1.0 + k as f64; 9]).collect()
+        (BLOCK * block..places.min(BLOCK * (block + 1))).map(|k| [1.0 + k as f64; SERIES_FIELDS]).collect()
     }
 
     #[test]

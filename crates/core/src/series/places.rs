@@ -117,19 +117,20 @@ impl SeriesPlan {
         fields.collect()
     }
 
-    /// `1/(E* b)` of the material at a place, m/N, and a half-space's displacements of the second and third order, m/N^2 and m/N^3.
-    fn half_space(&self, place: &Place) -> [f64; 3] {
+    /// `1/(E* b)` of the material at a place, m/N, and a half-space's displacements of the second to fourth order, m/N^2 to m/N^4.
+    fn half_space(&self, place: &Place) -> [f64; 4] {
         let node = self.problem.surface_nodes[self.smooth.fans()[place.fan].node as usize] as usize;
         let around = &self.elements.1[self.elements.0[node]..self.elements.0[node + 1]];
-        let [mut first, mut second, mut third] = [0.0; 3];
+        let [mut first, mut second, mut third, mut fourth] = [0.0; 4];
         for &(element, _) in around {
             let (material, law) = (&self.problem.materials[element as usize], &self.laws[element as usize]);
-            let [h2, h3] = half_space_terms(law, material.poissons_ratio);
+            let [h2, h3, h4] = half_space_terms(law, material.poissons_ratio);
             first += (1.0 - material.poissons_ratio.powi(2)) / (material.youngs_modulus * around.len() as f64);
             second += h2 / (material.youngs_modulus.powi(2) * around.len() as f64);
             third += h3 / (material.youngs_modulus.powi(3) * around.len() as f64);
+            fourth += h4 / (material.youngs_modulus.powi(4) * around.len() as f64);
         }
-        [first / place.width, second / place.width.powi(3), third / place.width.powi(5)]
+        [first / place.width, second / place.width.powi(3), third / place.width.powi(5), fourth / place.width.powi(7)]
     }
 }
 

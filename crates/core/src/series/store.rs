@@ -14,7 +14,7 @@ use crate::green::Progress;
 use crate::{Error, Result};
 
 /// Version of the computation and of the file's layout; part of the key.
-const VERSION: u32 = 9;
+const VERSION: u32 = 10;
 const KIND: ArraysKind = ArraysKind { format: "palpate-series", name: "file of series", version: VERSION };
 /// Digits of the key in the name of a file.
 const DIGITS: usize = 16;

@@ -30,7 +30,7 @@ use crate::tool::Tool;
 /// The file that describes the scene.
 pub const SCENE_FILE: &str = "scene.json";
 const FORMAT: &str = "palpate-scene";
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 /// Reads the scene of a folder.
 ///

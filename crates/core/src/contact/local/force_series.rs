@@ -3,10 +3,10 @@
 //! With the pressing force `F = -n . f` (outward normal `n`) of the force `f` on the body,
 //!
 //! ```text
-//! U(f) = F^2 b_3 . f + F^3 b_4 . f,    u = dU/df
+//! U(f) = F^2 b_3 . f + F^3 b_4 . f + F^5 beta,    u = dU/df
 //! ```
 //!
-//! is added to the linear `f^T C_reg f / 2`.
+//! is added to the linear `f^T C_reg f / 2`. The last term, `beta >= 0`, is of a body that softens, as a lobe that is bent away.
 //!
 //! A plate that is clamped hardens as it bends: its displacement `q = c_1 F + c_2 F^2 + c_3 F^3` with `c_3 < 0` has a maximum at
 //! about one thickness. The force as a function of the displacement, `F = y + alpha y^2 + kappa y^3` of `y = q/c_1`, has none. So in
@@ -33,8 +33,9 @@ use crate::contact::smooth::{Blended, FanWeights};
 use crate::tensor::outer;
 
 /// Numbers at a fan.
-pub const SERIES_FIELDS: usize = 9;
-/// `b_3` (m/N^2), `b_4` (m/N^3), `1/F_e` (1/N), `kappa` (1/N^2) and `alpha` (1/N) at a fan. All are zero where no series is known.
+pub const SERIES_FIELDS: usize = 10;
+/// `b_3` (m/N^2), `b_4` (m/N^3), `1/F_e` (1/N), `kappa` (1/N^2), `alpha` (1/N) and `beta` (m/N^4) at a fan. All are zero where no series
+/// is known.
 pub type SeriesFields = [f64; SERIES_FIELDS];
 /// Fields of `b_3`, of `b_4` and of `1/F_e`.
 const CUBIC: usize = 0;
@@ -42,6 +43,7 @@ const QUARTIC: usize = 3;
 const ENDING: usize = 6;
 const HARDENING: usize = 7;
 const BENDING: usize = 8;
+const SOFTENING: usize = 9;
 /// Newton steps to `y`; four give all digits. None follows one shorter than this part of the force.
 const STEPS: usize = 6;
 const SETTLED: f64 = 1e-9;
@@ -141,6 +143,11 @@ impl HardeningSpring {
         self.power(3.0, [1.6, 2.0], self.y * self.y)
     }
 
+    /// `P_4`.
+    fn fourth(&self) -> Power {
+        self.power(4.0, [5.0 / 3.0, 15.0 / 7.0], self.y * self.y * self.y)
+    }
+
     /// `P_k` with `F P_k = y^(k+1) (1 + s_1 alpha y + s_2 kappa y^2)` and `d(F P_k)/dF = (k + 1) y^k`; `lower` is `y^(k-1)`.
     fn power(&self, order: f64, shares: [f64; 2], lower: f64) -> Power {
         let Self { inverse_force, y, terms, by_force } = *self;
@@ -216,25 +223,34 @@ pub fn higher_orders(
     let mut found = HigherOrders { fraction: pressing * inverse_ending, ..HigherOrders::default() };
     let within = pressing.min(ending);
     let spring = HardeningSpring::new(within, [BENDING, HARDENING].map(|field| fields.values[field]));
-    let powers = [(CUBIC, spring.square()), (QUARTIC, spring.cube())];
     let (mut by_pressing, mut by_ending) = (0.0, 0.0);
-    for (first, at_most) in powers {
+    let mut add = |at_most: Power, b: DVec3, by_component: DMat3| -> Power {
         let power = if pressing > ending { at_most.straight_from(ending, pressing) } else { at_most };
         let Power { value, slope, curvature, by_terms, slope_by_terms, .. } = power;
-        let b = DVec3::from_slice(&fields.values[first..first + 3]);
         let along = b.dot(force);
         found.displacement += inward * (slope * along) + b * value;
         found.compliance += outer(inward, inward) * (curvature * along) + (outer(inward, b) + outer(b, inward)) * slope;
         found.energy += value * along;
-        let gradient: DVec3 = (0..3).map(|axis| fields.slope(first + axis) * force[axis]).sum();
+        let gradient = by_component * force;
         found.slope += gradient * value + (harder[0] * by_terms[0] + harder[1] * by_terms[1]) * along;
-        let by_component = DMat3::from_cols(fields.slope(first), fields.slope(first + 1), fields.slope(first + 2));
         found.slope_by_force += by_component * value + outer(gradient, inward) * slope;
         for k in 0..2 {
             found.slope_by_force += outer(harder[k], b * by_terms[k] + inward * (slope_by_terms[k] * along));
         }
         by_pressing += slope * along;
         by_ending += power.by_ending * along;
+        power
+    };
+    for (first, power) in [(CUBIC, spring.square()), (QUARTIC, spring.cube())] {
+        let b = DVec3::from_slice(&fields.values[first..first + 3]);
+        let [x, y, z] = [0, 1, 2].map(|axis| fields.slope(first + axis));
+        add(power, b, DMat3::from_cols(x, y, z));
+    }
+    let softening = fields.values[SOFTENING];
+    if softening > 0.0 {
+        let power = add(spring.fourth(), inward * softening, outer(fields.slope(SOFTENING), inward));
+        // It turns with the normal.
+        by_pressing += power.value * softening;
     }
     found.slope -= turning.transpose() * force * by_pressing;
     found.slope -= fields.slope(ENDING) * (by_ending * ending * ending);
@@ -251,7 +267,7 @@ mod tests {
     fn fields(at: DVec3) -> Blended<SERIES_FIELDS> {
         let slopes: [DVec3; SERIES_FIELDS] =
             std::array::from_fn(|k| DVec3::new(0.2 * k as f64 - 0.5, 0.3, -0.1 * k as f64) * 0.3);
-        let start = [0.2, -0.3, 0.5, -0.1, 0.07, 0.11, 0.8, 1.3, -0.4];
+        let start = [0.2, -0.3, 0.5, -0.1, 0.07, 0.11, 0.8, 1.3, -0.4, 0.3];
         let values = std::array::from_fn(|k| start[k] + slopes[k].dot(at));
         Blended::from_parts(values, slopes)
     }
