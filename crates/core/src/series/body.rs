@@ -36,10 +36,8 @@ pub struct PatchLoad {
 pub struct SeriesAt {
     /// `q_1` (m/N), `q_2` (m/N^2), `q_3` (m/N^3).
     pub displacements: [DVec3; 3],
-    /// `U_5` of 1 N, J/N^5.
-    pub fifth: f64,
-    /// `U_6` (J/N^6), and `U_7` (J/N^7) of a body that hardens.
-    pub last: [f64; 2],
+    /// `U_5` (J/N^5), `U_6` (J/N^6) and `U_7` (J/N^7).
+    pub energies: [f64; 3],
     /// `u_1`, `u_2`, `u_3` in the middle of the patch.
     pub middle: [DVec3; 3],
 }
@@ -75,17 +73,15 @@ impl HyperelasticBody {
         second.iter_mut().flatten().for_each(|force| *force = -*force);
         self.solve(&mut second, memory);
         let mut third = vec![vec![DVec3::ZERO; nodes]; loads.len()];
-        let fifth = elements.third_order(&first, &second, &mut third);
+        elements.third_order(&first, &second, &mut third);
         third.iter_mut().flatten().for_each(|force| *force = -*force);
         self.solve(&mut third, memory);
-        let at = |(k, load): (usize, &PatchLoad)| {
-            let fields = [&first[k][..], &second[k], &third[k]];
+        let fields: Vec<_> = (0..loads.len()).map(|k| [&first[k][..], &second[k], &third[k]]).collect();
+        let at = |((load, fields), energies): ((&PatchLoad, &[&[DVec3]; 3]), [f64; 3])| {
             let displacements = fields.map(|field| load.mean_displacement(field));
-            let hardens = displacements[2].dot(load.direction) < 0.0;
-            let last = if hardens { elements.last_orders(fields) } else { [elements.sixth_order(fields), 0.0] };
-            SeriesAt { displacements, fifth: fifth[k], last, middle: fields.map(|field| field[load.middle as usize]) }
+            SeriesAt { displacements, energies, middle: fields.map(|field| field[load.middle as usize]) }
         };
-        loads.iter().enumerate().map(at).collect()
+        loads.iter().zip(&fields).zip(elements.energies(&fields)).map(at).collect()
     }
 
     /// Replaces forces by the displacements under them.
@@ -150,8 +146,9 @@ mod tests {
         for (found, expected) in at.displacements.iter().zip([1.0, -0.5, 0.0]) {
             assert!((-found.z - expected).abs() < 1e-12, "{found}");
         }
-        // The orders four and five of the displacement.
-        assert!((5.0 * at.fifth - 0.125).abs() < 1e-12 && at.last[0].abs() < 1e-12, "{at:?}");
+        for (energy, expected) in at.energies.iter().zip([0.125 / 5.0, 0.0, -0.0625 / 7.0]) {
+            assert!((energy - expected).abs() < 1e-12, "{at:?}");
+        }
         let fields = coefficients(&at, -DVec3::Z, [0.0, 0.0, 0.0, 0.025]);
         // Less that of a half-space.
         assert!((5.0 * fields[9] - 0.1).abs() < 1e-12, "{fields:?}");

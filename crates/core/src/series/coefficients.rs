@@ -34,7 +34,8 @@ pub fn coefficients(at: &SeriesAt, inward: DVec3, half_space: [f64; 4]) -> Serie
     let (s4, s5, s6) = (s3 / s1, s3, s3 * s3 / (s1 * s1));
     let compliance = compliance * s1;
     let (q2, q3) = (q2 - inward * half_space[1], (q3 - inward * half_space[2]) * s3);
-    let [fourth, fifth, sixth] = [5.0 * at.fifth * s4, 6.0 * at.last[0] * s5, 7.0 * at.last[1] * s6];
+    let [fourth, fifth, sixth] = at.energies;
+    let [fourth, fifth, sixth] = [5.0 * fourth * s4, 6.0 * fifth * s5, 7.0 * sixth * s6];
     let orders = [q2.dot(inward), q3.dot(inward), fourth, fifth, sixth].map(|order| order / compliance);
     let Hardening { bending, hardening, softening, ending } = Hardening::new(orders, bends, half_space[3] / compliance);
     // In powers of y = F - alpha F^2 + .. in place of F.

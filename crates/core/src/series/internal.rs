@@ -2,8 +2,8 @@
 
 use glam::{DMat3, DVec3};
 
-use super::stress::{Gradients, stress};
-use super::truncated::{DEGREE, contraction};
+use super::stress::{Gradients, energy, stress};
+use super::truncated::DEGREE;
 use crate::contact::local::StrainLaw;
 use crate::element::{Tet4, Tet10, Tetrahedron, gradients};
 use crate::fem::Isotropic;
@@ -22,36 +22,22 @@ impl Elements<'_> {
     /// `r_2` of fields `u_1`, added to the `forces` of each, N.
     pub fn second_order(&self, first: &[Vec<DVec3>], forces: &mut [Vec<DVec3>]) {
         let fields: Vec<_> = first.iter().map(|first| [&first[..], &[], &[]]).collect();
-        self.each_stress(&fields, |load, [_, _, second], _, at| at.add_forces(second, &mut forces[load]));
+        self.each_stress(&fields, |load, [_, _, second], at| at.add_forces(second, &mut forces[load]));
     }
 
-    /// `r_3` of fields `u_1`, `u_2`, added to the `forces` of each, N; returns `U_5` of each.
-    pub fn third_order(&self, first: &[Vec<DVec3>], second: &[Vec<DVec3>], forces: &mut [Vec<DVec3>]) -> Vec<f64> {
+    /// `r_3` of fields `u_1`, `u_2`, added to the `forces` of each, N.
+    pub fn third_order(&self, first: &[Vec<DVec3>], second: &[Vec<DVec3>], forces: &mut [Vec<DVec3>]) {
         let fields: Vec<_> = first.iter().zip(second).map(|(first, second)| [&first[..], &second[..], &[]]).collect();
-        let mut fifth = vec![0.0; first.len()];
-        self.each_stress(&fields, |load, [_, _, _, third, fourth], [h1, h2, _], at| {
-            at.add_forces(third, &mut forces[load]);
-            fifth[load] -= at.weight * (contraction(fourth, h1) + 2.0 * contraction(third, h2)) / 5.0;
-        });
-        fifth
+        self.each_stress(&fields, |load, [_, _, _, third], at| at.add_forces(third, &mut forces[load]));
     }
 
-    /// `U_6` of fields `u_1`, `u_2`, `u_3`.
-    pub fn sixth_order(&self, fields: [&[DVec3]; 3]) -> f64 {
-        let mut found = 0.0;
-        self.each_stress(&[fields], |_, orders: &[DMat3; 6], [h1, h2, _], at| {
-            found -= at.weight * (contraction(&orders[5], h1) + 2.0 * contraction(&orders[4], h2)) / 6.0;
-        });
-        found
-    }
-
-    /// `U_6` and `U_7` of fields `u_1`, `u_2`, `u_3`.
-    pub fn last_orders(&self, fields: [&[DVec3]; 3]) -> [f64; 2] {
-        let mut found = [0.0; 2];
-        self.each_stress(&[fields], |_, orders: &[DMat3; 7], gradients, at| {
-            let work = |order: usize, by: usize| by as f64 * contraction(&orders[order], gradients[by - 1]);
-            found[0] -= at.weight * (work(5, 1) + work(4, 2)) / 6.0;
-            found[1] -= at.weight * (work(6, 1) + work(5, 2) + work(4, 3)) / 7.0;
+    /// `U_5`, `U_6` and `U_7` of fields `u_1`, `u_2`, `u_3`: the whole energy is stationary, so that the error of a sum of three orders,
+    /// of order 4, changes it in order 8. Of the orders 5 to 7 it is that of the strain.
+    pub fn energies(&self, fields: &[[&[DVec3]; DEGREE]]) -> Vec<[f64; 3]> {
+        let mut found = vec![[0.0; 3]; fields.len()];
+        self.each_gradient(fields, |load, element, gradients, at| {
+            let orders: [f64; 8] = energy(&self.laws[element], &self.materials[element], gradients);
+            found[load].iter_mut().zip(&orders[5..]).for_each(|(found, order)| *found -= at.weight * order);
         });
         found
     }
@@ -68,37 +54,45 @@ impl Elements<'_> {
         }
     }
 
-    /// Calls `use_stress` at each point of quadrature for each load, by its rank, with the first `O` coefficients of the stress and the
-    /// displacement gradients. An empty field is zero.
+    /// Calls `use_stress` at each point of quadrature of elements that are not linear, for each load, by its rank, with the first `O`
+    /// coefficients of the stress. An empty field is zero.
     fn each_stress<const O: usize>(
         &self,
         fields: &[[&[DVec3]; DEGREE]],
-        use_stress: impl FnMut(usize, &[DMat3; O], [&DMat3; DEGREE], &At<'_>),
+        mut use_stress: impl FnMut(usize, &[DMat3; O], &At<'_>),
+    ) {
+        self.each_gradient(fields, |load, element, gradients, at| {
+            if self.laws[element] != StrainLaw::Linear {
+                use_stress(load, &stress(&self.laws[element], &self.materials[element], gradients), at);
+            }
+        });
+    }
+
+    /// Calls `use_gradients` at each point of quadrature for each load, by its rank and the element's, with the displacement gradients.
+    fn each_gradient(
+        &self,
+        fields: &[[&[DVec3]; DEGREE]],
+        use_gradients: impl FnMut(usize, usize, &Gradients, &At<'_>),
     ) {
         match &self.mesh.tets {
-            Tets::Linear(tets) => self.each_stress_of::<Tet4, 4, O>(tets, fields, use_stress),
-            Tets::Quadratic(tets) => self.each_stress_of::<Tet10, 10, O>(tets, fields, use_stress),
+            Tets::Linear(tets) => self.each_gradient_of::<Tet4, 4>(tets, fields, use_gradients),
+            Tets::Quadratic(tets) => self.each_gradient_of::<Tet10, 10>(tets, fields, use_gradients),
         }
     }
 
-    fn each_stress_of<E: Tetrahedron<N>, const N: usize, const O: usize>(
+    fn each_gradient_of<E: Tetrahedron<N>, const N: usize>(
         &self,
         tets: &[[u32; N]],
         fields: &[[&[DVec3]; DEGREE]],
-        mut use_stress: impl FnMut(usize, &[DMat3; O], [&DMat3; DEGREE], &At<'_>),
+        mut use_gradients: impl FnMut(usize, usize, &Gradients, &At<'_>),
     ) {
-        for (e, nodes) in tets.iter().enumerate() {
-            if self.laws[e] == StrainLaw::Linear {
-                continue;
-            }
+        for (element, nodes) in tets.iter().enumerate() {
             let places = positions(&self.mesh.nodes, nodes);
             for point in E::stiffness_rule(&places) {
                 let (slopes, weight) = gradients::<E, N>(&places, point);
                 let at = At { nodes, slopes: &slopes, weight };
                 for (load, &fields) in fields.iter().enumerate() {
-                    let by_order: Gradients = fields.map(|field| at.gradient(field));
-                    let orders = stress(&self.laws[e], &self.materials[e], &by_order);
-                    use_stress(load, &orders, by_order.each_ref(), &at);
+                    use_gradients(load, element, &fields.map(|field| at.gradient(field)), &at);
                 }
             }
         }

@@ -3,7 +3,7 @@
 use std::iter::Sum;
 use std::ops::{Add, Mul};
 
-use glam::DMat3;
+use glam::{DMat3, DVec3};
 
 /// Degree of the deformation gradients here, which are polynomials: products with higher coefficients are left out.
 pub const DEGREE: usize = 3;
@@ -41,6 +41,15 @@ impl<const N: usize> Scalar<N> {
     pub fn shifted(mut self, by: f64) -> Self {
         self.0[0] += by;
         self
+    }
+
+    /// `ln self` of a series that begins with one: `n l_n = n a_n - sum k l_k a_(n-k)`.
+    pub fn logarithm(&self) -> Self {
+        let mut l = [0.0; N];
+        for n in 1..N {
+            l[n] = self.0[n] - (1..n).map(|k| k as f64 * l[k] * self.0[n - k]).sum::<f64>() / n as f64;
+        }
+        Self(l)
     }
 
     /// `exp(self)` of a series without constant: `n e_n = sum k l_k e_(n-k)`.
@@ -83,6 +92,25 @@ impl<const N: usize> Matrix<N> {
             *value = (1..=n.min(DEGREE)).map(|k| k as f64 * trace(k)).sum::<f64>() / n as f64;
         }
         Truncated(l)
+    }
+}
+
+/// The coefficients of a product of polynomials of degree [`DEGREE`].
+fn product<T: Copy, U: Copy, V: Sum, const N: usize>(a: &[T; N], b: &[U; N], of: impl Fn(T, U) -> V) -> [V; N] {
+    std::array::from_fn(|n| (n.saturating_sub(DEGREE)..=n.min(DEGREE)).map(|k| of(a[k], b[n - k])).sum())
+}
+
+impl<const N: usize> Matrix<N> {
+    /// `self : self` of a polynomial of degree [`DEGREE`].
+    pub fn squared(&self) -> Scalar<N> {
+        Truncated(product(&self.0, &self.0, |a, b| contraction(&a, &b)))
+    }
+
+    /// `det self` of such a polynomial.
+    pub fn determinant(&self) -> Scalar<N> {
+        let [x, y, z] = [0, 1, 2].map(|axis| self.0.map(|matrix| matrix.col(axis)));
+        let across = product(&y, &z, DVec3::cross);
+        Truncated(std::array::from_fn(|n| (0..=n.min(DEGREE)).map(|k| x[k].dot(across[n - k])).sum()))
     }
 }
 
