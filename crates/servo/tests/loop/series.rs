@@ -28,7 +28,7 @@ fn reading(tool: usize, tick: u64) -> Reading {
 fn series(model: &Model, known: impl Fn(DVec3) -> bool, blocks: usize) -> Arc<KnownSeries> {
     let smooth = SmoothSurface::new(&model.bodies[0].green().surface);
     // Most of it by the second order; the series ends at 10 N.
-    let at = |position| if known(position) { [0.0, 0.0, -2e-3, 0.0, 0.0, 0.0, 0.1, 0.0, 0.0] } else { [0.0; 9] };
+    let at = |position| if known(position) { [0.0, 0.0, -2e-3, 0.0, 0.0, 0.0, 0.1, 0.0, 0.0, 1e-3] } else { [0.0; 10] };
     let fields = smooth.fans().iter().map(|fan| at(fan.position)).collect();
     Arc::new(KnownSeries::new(RADIUS, fields, vec![true; blocks]))
 }
