@@ -61,9 +61,9 @@ def wrong_with(found: Played, surface: Surface, tool: str) -> str | None:
     points, ticks = rows["point"].astype(float), rows["tick"].astype(int)
     if surface.off(points) > OFF:
         return f"a place {surface.off(points):.3g} elements off the body"
-    # A place is carried along with the surface by as much as the tool has come since it touched: from the start, in a
-    # hollow that is narrower than the tool.
-    come = np.linalg.norm(found.path[ticks] - found.path[0], axis=1)
+    # A place is carried along with the surface by as much as the tool has come since it touched, and as it was deep
+    # then: in a hollow that is narrower than the tool it starts inside.
+    come = rows["depth"][0] + np.linalg.norm(found.path[ticks] - found.path[ticks[0]], axis=1)
     away = np.linalg.norm(points - found.path[ticks], axis=1) - size_of(tool) - np.maximum(come, rows["depth"])
     return f"a place {1e3 * away.max():.3g} mm too far from the tool" if away.max() > 0 else None
 
