@@ -1,4 +1,4 @@
-"""A block with one edge, sharp or round, and the contact of a rigid tool there solved directly.
+"""A block with one edge, sharp or round, or a blade, and the contact of a rigid tool there solved directly.
 
 The tool keeps its shape and the body is linear, so the contact is the minimum of the body's energy with no point of its
 surface inside the tool. `phi` is the tool's signed distance, `n` its gradient. Near displacements `u_k`
@@ -124,32 +124,46 @@ def _meshed(shape, coarsest: float) -> TetMesh:
     return TetMesh(points, tets[:, FROM_NETGEN[10]])
 
 
-def body_of(mesh: TetMesh, half: bool) -> Body:
-    """Held at the two faces away from the edge; a half keeps its plane of symmetry."""
+def outward(degrees: float) -> np.ndarray:
+    """Unit vector from the edge away from the body, along the bisector of its angle."""
+    half = np.radians(degrees / 2)
+    return np.array([np.cos(half), 0.0, np.sin(half)])
+
+
+def body_of(mesh: TetMesh, half: bool, degrees: float = 90.0) -> Body:
+    """The block sheared to an edge of so many degrees, held at the two faces away from it.
+
+    A half keeps its plane of symmetry.
+    """
     x, y, z = mesh.nodes.T
     fixed = np.zeros(mesh.nodes.shape, dtype=bool)
     fixed[(x < -WIDTH + 1e-9) | (z < -WIDTH + 1e-9)] = True
     if half:
         fixed[np.abs(y) < 1e-9, 1] = True
-    return quiet_body(mesh, SOFT, fixed)
+    return quiet_body(_sheared(mesh, degrees), SOFT, fixed)
+
+
+def _sheared(mesh: TetMesh, degrees: float) -> TetMesh:
+    x, y, z = mesh.nodes.T
+    return TetMesh(np.column_stack([x + z / np.tan(np.radians(degrees)), y, z]), mesh.tets)
 
 
 @cache
-def direct_contact(rounding: float, region: Region) -> DirectContact:
-    """Make the contact problem of a rounding once for all tools."""
-    mesh = half_block(rounding, region)
-    return DirectContact(mesh, region)
+def direct_contact(rounding: float, region: Region, degrees: float = 90.0) -> DirectContact:
+    """Make the contact problem of an edge once for all tools."""
+    return DirectContact(half_block(rounding, region), region, degrees)
 
 
 class DirectContact:
     """Compliance of the fine part of a half block's surface, and its presses."""
 
-    def __init__(self, mesh: TetMesh, region: Region):
+    def __init__(self, mesh: TetMesh, region: Region, degrees: float = 90.0):
         faces = _near_faces(mesh, region)
         self._nodes, local = np.unique(faces, return_inverse=True)
         self._faces = local.reshape(faces.shape)
-        green = green_of(body_of(mesh, half=True), touch=self._nodes)
-        self._places = mesh.nodes[self._nodes]
+        body = body_of(mesh, half=True, degrees=degrees)
+        green = green_of(body, touch=self._nodes)
+        self._places = body.mesh.nodes[self._nodes]
         self._compliance = compliance_between(green, self._nodes)
         self._shapes, self._hats, self._areas = self._quadrature()
 

@@ -136,10 +136,11 @@ def deepest_without_force(crossing: Crossing, path: np.ndarray, forces: np.ndarr
     return max(depths, default=0.0) / RADII[crossing.tool]
 
 
-# The blade bends aside by more than the tool's radius and springs back, as `spring_of_blade` says too: how many times
-# more than allowed a force may jump then, within so many metres of the path from where the tip alone springs.
+# The blade bends aside and springs back, as `spring_of_blade` says too: how many times more than allowed a force may
+# jump then, within so many metres of the path from where the tip alone springs. The contact's own compliance lets it
+# go earlier.
 SPRINGS = {("ridge", 30, "capsule", "along"): 3.3}
-AROUND_SPRING = 0.6e-3
+AROUND_SPRING = 1.3e-3
 
 
 def judged(loops: Loops, crossing: Crossing) -> str | None:
@@ -307,7 +308,7 @@ def test_a_thin_blade_springs_back_under_a_capsule_along_it(loops):
             assert 2 < largest_jump(forces) <= most
             # A single tick springs.
             assert np.sort(jumps(forces))[-2] <= 1
-        assert sizes[0] == pytest.approx(sizes[1], rel=0.15)
+        assert sizes[0] == pytest.approx(sizes[1], rel=0.3)
         # An edge of 90 degrees is stiff enough sideways.
         stiff = spring_of_blade(tip_stiffness(loops, 90, path), path[:, [0, 2]], RADII[tool])
         assert np.linalg.norm(stiff, axis=1).max() > 0.05 and largest_jump(stiff) < 1
@@ -320,12 +321,7 @@ HELD = {
     "punch": ["upright"],
     "file": ["across"],
 }
-# A tool from a file leaves the pieces' own normals, which turn over from one side of a thin blade to the other.
-TURNS_OVER = Crossing("ridge", 30, "file", "across", 1e-3)
-EVERY = [
-    pytest.param(crossing, marks=pytest.mark.xfail(strict=True)) if crossing == TURNS_OVER else crossing
-    for crossing in crossings(["convex", "ridge", "concave", "valley"], [30, 60, 90, 120, 150], HELD, [1e-3])
-]
+EVERY = crossings(["convex", "ridge", "concave", "valley"], [30, 60, 90, 120, 150], HELD, [1e-3])
 
 
 # Of the eight poses of an edge and of the five angles each share has all.

@@ -53,6 +53,8 @@ const FACING: [f64; 2] = [0.0, 0.5];
 /// Length over the sphere's radius from which an edge counts, and distances beyond its end from which it counts in part, and not.
 const SHORTEST: f64 = 1.0;
 const ENDING: [f64; 2] = [0.0, 1.0];
+/// Largest turn of the normal over a right angle: a thinner blade bends as a whole.
+const MOST_TURN: f64 = 1.5;
 /// Distance of another edge in about the same direction, over the radius, from which an edge counts.
 const ALONE: f64 = 2.0;
 /// Most edges beside which a sphere is at once; any others are not followed.
@@ -233,6 +235,7 @@ impl ConvexEdges {
     /// For a sphere of `radius`, m; `None` for a surface without such edges.
     pub fn new((surface, query, smooth): (&Surface, &SurfaceQuery, &SmoothSurface), radius: f64) -> Option<Self> {
         let mut edges = convex_edges(surface, smooth);
+        edges.retain(|edge| edge.turn <= MOST_TURN);
         keep_single(&mut edges, ALONE * radius);
         keep_long(&mut edges, SHORTEST * radius);
         if edges.is_empty() {

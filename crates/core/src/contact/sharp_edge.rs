@@ -11,8 +11,6 @@ use crate::mesh::Surface;
 
 /// `L`: least share of the modulus over an edge.
 const LEAST_SHARE: f64 = 0.35;
-/// Turn of the normal over a right angle beyond which an edge is a blade, which bends as a whole.
-const BLADE: f64 = 1.5;
 /// Cosine of the angle between two edges that meet, from which they are pieces of one.
 const SAME_CHAIN: f64 = 0.7;
 /// `m = q (M_0 + M_1 q)` with the turn `q` of the normal over a right angle, and its largest value.
@@ -27,6 +25,8 @@ pub struct Edge {
     /// Unit vectors from the edge into both faces, and the normals of these.
     pub into: [DVec3; 2],
     pub normals: [DVec3; 2],
+    /// Turn of the normal over it, over a right angle.
+    pub turn: f64,
     /// `m (1 - L)`.
     pub deficit: f64,
     /// Number of the edge; all its pieces have the same.
@@ -50,14 +50,11 @@ pub fn convex_edges(surface: &Surface, smooth: &SmoothSurface) -> Vec<Edge> {
     for crease in smooth.convex_creases(surface) {
         let ConvexCrease { ends, normals, .. } = crease;
         let turn = acos(normals[0].dot(normals[1]).clamp(-1.0, 1.0)) / FRAC_PI_2;
-        if turn > BLADE {
-            continue;
-        }
         let along = (ends[1] - ends[0]).normalize_or_zero();
         let into = [normals[0].cross(along), along.cross(normals[1])];
         let by_turn = (turn * (BY_TURN[0] + BY_TURN[1] * turn)).min(MOST_BY_TURN);
         let deficit = by_turn * (1.0 - LEAST_SHARE);
-        edges.push(Edge { ends, along, into, normals, deficit, chain: u32::MAX, is_last: [true; 2] });
+        edges.push(Edge { ends, along, into, normals, turn, deficit, chain: u32::MAX, is_last: [true; 2] });
         nodes.push(crease.nodes);
     }
     number_chains(&mut edges, &nodes);

@@ -27,7 +27,7 @@ pub struct Model {
     pub(super) regular_compliances: Vec<Vec<Option<Arc<RegularCompliance>>>>,
     /// By tool and body, for such tools that are not spheres: the surface divided into pieces.
     pub(super) pressed_surfaces: Vec<Vec<Option<Arc<PressedSurface>>>>,
-    /// By tool and body, for spheres: the sharp convex corners of the surface, where it has any.
+    /// By tool and body, for spheres: the sharp convex corners and blades of the surface, where it has any.
     pub(super) corner_surfaces: Vec<Vec<Option<Arc<CornerSurface>>>>,
     /// Sharp convex edges, for spheres under the local law.
     pub(super) convex_edges: Vec<Vec<Option<Arc<ConvexEdges>>>>,

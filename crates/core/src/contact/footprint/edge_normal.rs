@@ -17,6 +17,7 @@
 
 use glam::{DMat3, DVec3};
 
+use super::crest::{self, Crest};
 use super::{FootprintScratch, NearPiece, PlacedShape, Sums, smooth_step};
 use crate::contact::shape::ToolShape;
 use crate::tensor::outer;
@@ -24,8 +25,8 @@ use crate::tensor::outer;
 /// Distances of a piece, over the tool's reach, from which the tool's normal begins to count there, and counts alone: deep inside
 /// of a tool, where two of its sides are as near, its normal jumps.
 const OWN_NORMAL: [f64; 2] = [-0.75, -0.25];
-/// Least reach of a tool, over its thickness: at a rim that is rounded less, as a punch's, the tool's own normal turns as fast as the
-/// body's does over an edge. Tools with less, and surfaces from files, leave the body's own normals.
+/// Least reach of a tool, over its thickness: one with less, as a flat ellipsoid or a file with thin parts, turns as fast as the body
+/// does over an edge, and leaves the body's own normals.
 const LEAST_REACH: f64 = 0.5;
 /// Measure of a bulge, `mean(n_i . x_i) - N . X` over the tool's thickness, below which the pieces lie in a crease, and not at all.
 const BULGING: [f64; 2] = [-0.02, 0.0];
@@ -59,21 +60,23 @@ pub(super) fn reach(tool: &ToolShape) -> Option<f64> {
 }
 
 impl FootprintScratch {
-    /// Mixes the tool's own normals into the sum of normals.
-    pub(super) fn turn_to_tool(&mut self, tool: &PlacedShape<'_>, reach: f64, sums: &mut Sums) {
+    /// Mixes the tool's own normals into the sum of normals; returns the crest below.
+    pub(super) fn turn_to_tool(&mut self, tool: &PlacedShape<'_>, reach: f64, sums: &mut Sums) -> Option<Crest> {
         let thickness = tool.shape.thickness();
         if !sums.may_turn(thickness) {
-            return;
+            return None;
         }
         self.near.find_turnings(tool);
         let edge = self.sum_over_edge(reach);
-        let is_edge = either(sums.share_of_spread(), sums.share_of_difference(&edge));
+        let is_edge = either(sums.share_of_spread(SPREAD), sums.share_of_difference(&edge));
         let in_air = both(sums.share_of_bulge(&edge, thickness), sums.share_without_walls(&edge));
+        let crest = self.find_crest(sums, both(sums.share_of_spread(crest::SPREAD), in_air));
         let (share, share_by) = both(is_edge, in_air);
         for k in 0..2 {
             sums.normal_by[k] += edge.difference_by[k] * share + outer(edge.difference, share_by[k]);
         }
         sums.normal += edge.difference * share;
+        crest
     }
 
     fn sum_over_edge(&self, reach: f64) -> EdgeSums {
@@ -161,10 +164,10 @@ impl Sums {
         (1.0 - share, by)
     }
 
-    fn share_of_spread(&self) -> Share {
+    pub(super) fn share_of_spread(&self, bounds: [f64; 2]) -> Share {
         let inverse = 1.0 / self.weight;
         let normal = self.normal * inverse;
-        let (share, slope) = smooth_step(1.0 - normal.length_squared(), SPREAD);
+        let (share, slope) = smooth_step(1.0 - normal.length_squared(), bounds);
         let by = [0, 1].map(|k| {
             let normal_by = (self.normal_by[k] - outer(normal, self.weight_by[k])) * inverse;
             normal_by.transpose() * normal * (-2.0 * slope)
@@ -200,6 +203,7 @@ mod tests {
     use crate::contact::SurfaceQuery;
     use crate::contact::footprint::{Plane, PressedSurface};
     use crate::contact::regular::FanFields;
+    use crate::contact::shape::{SurfaceShape, tests::box_mesh};
     use crate::contact::smooth::tests::{cube, near};
     use crate::contact::smooth::{FanWeights, SmoothSurface};
 
@@ -209,7 +213,10 @@ mod tests {
         let surface = cube();
         let (query, smooth) = (SurfaceQuery::new(&surface).expect("triangles"), SmoothSurface::new(&surface));
         let fields = vec![FanFields::default(); smooth.fans().len()];
+        let (vertices, triangles) = box_mesh(DVec3::new(0.2, 0.25, 0.3));
         let shapes = [
+            ToolShape::Surface(Box::new(SurfaceShape::new(&vertices, &triangles).expect("a shape"))),
+            ToolShape::punch(0.1, 0.01).expect("a shape"),
             ToolShape::ellipsoid(DVec3::new(0.2, 0.15, 0.1)).expect("a shape"),
             ToolShape::punch(0.1, 0.08).expect("a shape"),
             ToolShape::capsule(0.1, 0.1).expect("a shape"),

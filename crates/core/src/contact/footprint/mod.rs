@@ -17,12 +17,14 @@
 //! tick is therefore flattened to that plane, completely if it is steeper than 78 degrees and not at all up to 45. It is pressed by
 //! an additional contact of the same tool, on a plane of its own. A piece belongs to the plane that it is most parallel to.
 
+mod crest;
 mod edge_normal;
 mod facing;
 mod near;
 
 use glam::{DMat3, DVec3};
 
+pub use self::crest::Crest;
 pub use self::near::{NearPiece, NearPieces, PlacedShape};
 use super::local::ContactPlane;
 use super::local::cells::{GridFrame, Heights, LEAST_COSINE, Relief, SurfaceEnd, Wedge};
@@ -86,6 +88,8 @@ pub struct Footprint {
     pub origin: DVec3,
     /// Its derivatives.
     pub origin_by: [DMat3; 2],
+    /// The crest that it lies on.
+    pub crest: Option<Crest>,
 }
 
 /// A contact's plane of the previous tick.
@@ -196,9 +200,7 @@ impl FootprintScratch {
         self.flatten_walls(fine, known);
         let reach = edge_normal::reach(tool.shape);
         let mut sums = self.sum(reach)?;
-        if let Some(reach) = reach {
-            self.turn_to_tool(tool, reach, &mut sums);
-        }
+        let crest = reach.and_then(|reach| self.turn_to_tool(tool, reach, &mut sums));
         let MeanNormal { normal, by: normal_by } = sums.mean_normal(known.normal);
         let inverse = 1.0 / sums.weight;
         let middle = sums.place * inverse;
@@ -216,6 +218,7 @@ impl FootprintScratch {
             normal_by,
             origin: middle + normal * level,
             origin_by: [raised(0), raised(1)],
+            crest,
         })
     }
 

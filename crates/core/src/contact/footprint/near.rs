@@ -142,12 +142,15 @@ impl PlacedShape<'_> {
         let arm = centre - self.position;
         let above = (point - centre).dot(self.contact_normal).max(0.0);
         let at = point - self.contact_normal * above;
-        let (mut distance, gradient) = self.shape.signed_distance(self.rotation.transpose() * (at - self.position));
+        let in_tool = self.rotation.transpose() * (at - self.position);
+        let (mut distance, gradient) = self.shape.signed_distance(in_tool);
+        let rounded = self.rotation * self.shape.rounded_direction(in_tool, gradient);
         let gradient = self.rotation * gradient;
         let mut by_pose = [-gradient, gradient.cross(at - self.position)];
         // The height of the middle moves with the tool.
         let mut rise = if above > 0.0 { gradient.dot(self.contact_normal) } else { 0.0 };
-        let normal = self.contact_normal * rise - gradient;
+        let lifted = if above > 0.0 { rounded.dot(self.contact_normal) } else { 0.0 };
+        let normal = self.contact_normal * lifted - rounded;
         if above > headroom {
             distance += HEADROOM_SLOPE * (above - headroom);
             rise -= HEADROOM_SLOPE;
@@ -165,7 +168,7 @@ impl PlacedShape<'_> {
         let normal = self.contact_normal;
         let above = (point - centre).dot(normal);
         let at = point - normal * above.max(0.0) - self.position;
-        let (gradient, turning) = self.shape.turning_gradient(self.rotation.transpose() * at);
+        let (gradient, turning) = self.shape.rounded_gradient(self.rotation.transpose() * at);
         let turning = self.rotation * turning * self.rotation.transpose();
         let gradient = self.rotation * gradient;
         if above <= 0.0 {

@@ -6,6 +6,7 @@
 mod capsule;
 pub(crate) mod ellipsoid;
 mod punch;
+mod spline;
 mod surface;
 mod turning;
 
@@ -17,8 +18,8 @@ use crate::math::hypot;
 use crate::tensor::outer;
 use crate::{Error, Result};
 
-/// Extent of a capsule across its axis that counts, over that along it.
-const UPRIGHT_EXTENT: f64 = 2e-3;
+/// Extent that counts of a tool that is round, over that of a long one.
+const ROUND_EXTENT: f64 = 2e-3;
 
 /// Shape of a tool.
 #[derive(Clone, Debug)]
@@ -130,7 +131,8 @@ impl ToolShape {
         Ok(Self::Punch { radius, rounding })
     }
 
-    /// Signed distance of a point, m, negative inside, and its gradient, a unit vector away from the shape.
+    /// Signed distance of a point, m, negative inside, and its gradient: a unit vector away from the shape, and of a surface from a file
+    /// nearly one, shorter where its splines round an edge.
     ///
     /// Where several points of the shape are closest, the gradient is that of one of them.
     pub fn signed_distance(&self, point: DVec3) -> (f64, DVec3) {
@@ -196,14 +198,13 @@ impl ToolShape {
         }
     }
 
-    /// Depth below its surface to which all points have one closest point, m: its least radius of curvature. That of a surface from a
-    /// file is not known, and zero.
+    /// Depth below its surface to which [`ToolShape::rounded_gradient`] is that of one side, m.
     pub fn reach(&self) -> f64 {
         match *self {
             Self::Sphere { radius } | Self::Capsule { radius, .. } => radius,
             Self::Ellipsoid { semi_axes } => semi_axes.min_element().powi(2) / semi_axes.max_element(),
-            Self::Punch { rounding, .. } => rounding,
-            Self::Surface(_) => 0.0,
+            Self::Punch { radius, rounding } => punch::at_least_rounded(radius, rounding),
+            Self::Surface(ref surface) => surface.inner_radius,
         }
     }
 
@@ -212,10 +213,7 @@ impl ToolShape {
         match *self {
             Self::Sphere { radius } | Self::Capsule { radius, .. } | Self::Punch { radius, .. } => radius,
             Self::Ellipsoid { semi_axes } => semi_axes.min_element(),
-            Self::Surface(ref surface) => {
-                let widths = DVec3::AXES.map(|axis| (surface.support(axis) - surface.support(-axis)).dot(axis));
-                0.5 * widths.into_iter().fold(f64::INFINITY, f64::min)
-            }
+            Self::Surface(ref surface) => surface.thickness(),
         }
     }
 
@@ -224,12 +222,12 @@ impl ToolShape {
     pub fn extents(&self) -> DMat3 {
         let along = |axis: DVec3| outer(axis, axis);
         match *self {
-            Self::Sphere { .. } => along(DVec3::Z),
+            Self::Sphere { .. } => along(DVec3::Z) * ROUND_EXTENT,
             // One that stands upright is round too, and the cells have to keep a direction. Between the axes of the tool: edges are
             // often parallel to these, and a row of cells that passes an edge at once has no exact gradient.
-            Self::Capsule { .. } => along(DVec3::Z) + along(DVec3::new(0.8, 0.6, 0.0)) * UPRIGHT_EXTENT,
-            // Its face is round, so the axis that lies in the face serves as well as any.
-            Self::Punch { .. } => along(DVec3::X),
+            Self::Capsule { .. } | Self::Punch { .. } => {
+                along(DVec3::Z) + along(DVec3::new(0.8, 0.6, 0.0)) * ROUND_EXTENT
+            }
             // That of its shadow.
             Self::Ellipsoid { semi_axes } => {
                 let parts = semi_axes / semi_axes.max_element();

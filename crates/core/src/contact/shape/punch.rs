@@ -11,6 +11,14 @@ pub(super) const LENGTH: f64 = 4.0;
 /// sharpen lines that graze.
 const MAX_LINE_STEPS: usize = 24;
 
+/// Least rounding for the directions in which a contact may face, over the radius.
+const LEAST_ROUNDING: f64 = 0.5;
+
+/// A rounding, or the least one for the directions in which a contact may face.
+pub(super) fn at_least_rounded(radius: f64, rounding: f64) -> f64 {
+    rounding.max(LEAST_ROUNDING * radius)
+}
+
 /// Distance and its gradient.
 pub(super) fn signed_distance(radius: f64, rounding: f64, point: DVec3) -> (f64, DVec3) {
     let half = 0.5 * LENGTH * radius;

@@ -1,8 +1,8 @@
 //! A closed surface by its signed distance on a grid.
 //!
-//! Distances are exact at the grid's nodes (parry's closest point and pseudo-normals) and interpolated by quadratic
-//! B-splines: the gradient is continuous, so that forces are, and edges are rounded by about a grid cell. Linear interpolation
-//! would make every grid plane a crease; cubic splines take 64 coefficients in place of 27.
+//! Distances are exact at the grid's nodes (parry's closest point and pseudo-normals) and interpolated by splines, which round edges
+//! by about a grid cell. The directions in which a contact over a body's edge may face are those of a coarser grid, which rounds
+//! the tool's own edges by about half its thickness.
 
 use std::collections::HashMap;
 
@@ -11,15 +11,17 @@ use parry3d_f64::query::PointQueryWithLocation;
 use parry3d_f64::shape::{TriMesh, TriMeshFlags};
 
 use super::LineEntry;
+use super::spline::{Grid, Spline};
 use crate::math::sincos;
+use crate::tensor::across;
 use crate::{Error, Result};
 
 /// Grid cells along the longest side of the surface.
 const CELLS_ALONG_LONGEST: f64 = 48.0;
-/// Grid cells around the surface on every side: the spline needs one, a line that passes by another.
-const MARGIN: f64 = 2.0;
-/// Sweeps that make the spline pass through the distances at the nodes; each leaves a quarter of the error at worst.
-const PREFILTER_SWEEPS: usize = 12;
+/// Edge of a cell of the coarser grid, over the radius of the largest ball inside.
+const ROUNDED_CELL: f64 = 0.35;
+/// Least slope of the coarser distance with a direction: where two sides are as near it has none.
+const LEAST_SLOPE: f64 = 0.1;
 /// Directions whose farthest vertices are stored.
 const SUPPORT_DIRECTIONS: usize = 256;
 /// How far the splines may bulge out of a surface, in grid cells.
@@ -34,13 +36,12 @@ const LEAST_TRIANGLES: usize = 4;
 /// A closed surface in a tool's own frame.
 #[derive(Clone)]
 pub struct SurfaceShape {
-    /// Position of the first node, m.
-    corner: DVec3,
-    /// Edge of a grid cell, m.
-    spacing: f64,
-    nodes: [usize; 3],
-    /// Coefficients of the splines, m; x runs fastest.
-    coefficients: Vec<f32>,
+    /// Signed distance, m.
+    distance: Spline,
+    /// The same with all edges rounded.
+    rounded: Spline,
+    /// Radius of the largest ball inside, m.
+    pub(super) inner_radius: f64,
     /// Vertices that reach farthest in some direction, m.
     extreme_points: Vec<DVec3>,
     /// No point of the surface lies farther outside of their hull, m.
@@ -55,8 +56,7 @@ pub struct SurfaceShape {
 impl std::fmt::Debug for SurfaceShape {
     /// Without its thousands of numbers.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let nodes = &self.nodes;
-        f.debug_struct("SurfaceShape").field("spacing", &self.spacing).field("nodes", nodes).finish_non_exhaustive()
+        f.debug_struct("SurfaceShape").field("spacing", &self.distance.grid.spacing).finish_non_exhaustive()
     }
 }
 
@@ -74,16 +74,19 @@ impl SurfaceShape {
         let (low, high) =
             used().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
         let spacing = (high - low).max_element() / CELLS_ALONG_LONGEST;
-        let nodes = ((high - low) / spacing).to_array().map(|cells| (cells + 2.0 * MARGIN).ceil() as usize + 1);
-        let corner = low - DVec3::splat(MARGIN * spacing);
+        let distance_to = |point| signed_distance(&mesh, point);
+        let grid = Grid::around([low, high], spacing);
+        let distances = grid.values(distance_to);
+        let inner_radius = -distances.iter().copied().fold(0.0, f64::min);
+        let coarser = Grid::around([low, high], spacing.max(ROUNDED_CELL * inner_radius));
+        let rounded = coarser.values(distance_to);
         let centre = 0.5 * (low + high);
         let extreme_points = extreme_points(used);
         Ok(Self {
             hull_margin: hull_margin(used, &extreme_points) + OVERSHOOT * spacing,
-            corner,
-            spacing,
-            nodes,
-            coefficients: prefiltered(&distances(&mesh, corner, spacing, nodes), nodes),
+            distance: Spline::through(grid, &distances),
+            rounded: Spline::past(coarser, &rounded),
+            inner_radius,
             extreme_points,
             centre,
             bounding_radius: used().map(|v| v.distance(centre)).fold(0.0, f64::max),
@@ -91,49 +94,38 @@ impl SurfaceShape {
         })
     }
 
-    /// Interpolated distance and the direction of its gradient; beyond the grid, the distance of the grid is added.
+    /// Interpolated distance and its gradient; beyond the grid, the distance of the grid is added.
     pub(super) fn signed_distance(&self, point: DVec3) -> (f64, DVec3) {
-        let far = self.corner + self.spacing * DVec3::from_array(self.nodes.map(|n| (n - 1) as f64));
-        let inside = point.clamp(self.corner, far);
-        let (value, gradient) = self.interpolate(inside);
+        let inside = self.distance.grid.nearest(point);
+        let (value, gradient) = self.distance.at(inside);
         let beyond = point - inside;
-        match beyond.try_normalize() {
-            Some(direction) => (value + beyond.length(), direction),
-            None => (value, gradient.try_normalize().unwrap_or(DVec3::NEG_Z)),
-        }
+        let Some(direction) = beyond.try_normalize() else { return (value, gradient) };
+        // The nearest point of the grid moves along only those axes on which the point is within it.
+        let along_side = DVec3::select(beyond.cmpeq(DVec3::ZERO), gradient, DVec3::ZERO);
+        (value + beyond.length(), along_side + direction)
     }
 
-    /// Value and gradient of the spline at a point of the grid.
-    fn interpolate(&self, point: DVec3) -> (f64, DVec3) {
-        let place = ((point - self.corner) / self.spacing).to_array();
-        let mut first = [0; 3];
-        let mut weights = [[[0.0; 3]; 2]; 3];
-        for axis in 0..3 {
-            let middle = place[axis].round().clamp(1.0, (self.nodes[axis] - 2) as f64);
-            let f = place[axis] - middle;
-            first[axis] = middle as usize - 1;
-            weights[axis] = [
-                [0.5 * (0.5 - f) * (0.5 - f), 0.75 - f * f, 0.5 * (0.5 + f) * (0.5 + f)],
-                [f - 0.5, -2.0 * f, f + 0.5],
-            ];
-        }
-        let [[wx, gx], [wy, gy], [wz, gz]] = weights;
-        let (mut value, mut gradient) = (0.0, DVec3::ZERO);
-        for k in 0..3 {
-            let (mut plane, mut plane_x, mut plane_y) = (0.0, 0.0, 0.0);
-            for j in 0..3 {
-                let at = first[0] + self.nodes[0] * (first[1] + j + self.nodes[1] * (first[2] + k));
-                let Some(&[a, b, c]) = self.coefficients[at..].first_chunk::<3>() else { continue };
-                let row = [f64::from(a), f64::from(b), f64::from(c)];
-                let along = row[0] * wx[0] + row[1] * wx[1] + row[2] * wx[2];
-                plane += wy[j] * along;
-                plane_y += gy[j] * along;
-                plane_x += wy[j] * (row[0] * gx[0] + row[1] * gx[1] + row[2] * gx[2]);
-            }
-            value += wz[k] * plane;
-            gradient += DVec3::new(wz[k] * plane_x, wz[k] * plane_y, gz[k] * plane);
-        }
-        (value, gradient / self.spacing)
+    /// Direction in which the rounded distance grows, and its slope there; beyond the grid those at its nearest point.
+    pub(super) fn rounded_direction(&self, point: DVec3) -> (DVec3, f64) {
+        let (_, gradient) = self.rounded.at(self.rounded.grid.nearest(point));
+        let slope = gradient.length().max(LEAST_SLOPE);
+        (gradient / slope, slope)
+    }
+
+    /// The direction, and its derivative by the point, 1/m: with the slope `s`, the direction `g` and the projection `P` across it,
+    /// `P H/s`, where `H` is the second derivative of the distance.
+    pub(super) fn rounded_gradient(&self, point: DVec3) -> (DVec3, DMat3) {
+        let (direction, slope) = self.rounded_direction(point);
+        let inside = self.rounded.grid.nearest(point);
+        // Along axes on which the point is beyond the grid the nearest one stays.
+        let moves = DMat3::from_diagonal(DVec3::select(point.cmpeq(inside), DVec3::ONE, DVec3::ZERO));
+        (direction, across(direction) * self.rounded.second_derivative(inside) * moves * (1.0 / slope))
+    }
+
+    /// Half its width where it is narrowest along an axis, m.
+    pub(super) fn thickness(&self) -> f64 {
+        let widths = DVec3::AXES.map(|axis| (self.support(axis) - self.support(-axis)).dot(axis));
+        0.5 * widths.into_iter().fold(f64::INFINITY, f64::min)
     }
 
     /// Farthest of the stored vertices, moved outwards by the largest distance of the others from their hull: no point of the
@@ -167,9 +159,9 @@ impl SurfaceShape {
             let newton = if slope < 0.0 { -value / slope } else { f64::INFINITY };
             // The next step would change the distance by the square of this one.
             if newton.abs() < LAST_STEP * self.bounding_radius {
-                return Some(LineEntry { distance: distance + newton, normal: gradient });
+                return Some(LineEntry { distance: distance + newton, normal: gradient.normalize_or(-direction) });
             }
-            distance += newton.abs().min(2.0 * self.spacing).max(value.abs()).copysign(value);
+            distance += newton.abs().min(2.0 * self.distance.grid.spacing).max(value.abs()).copysign(value);
         }
         None
     }
@@ -219,42 +211,11 @@ fn checked(vertices: &[DVec3], triangles: &[[u32; 3]]) -> Result<Vec<[u32; 3]>> 
     })
 }
 
-/// Distances of all nodes, negative inside.
-fn distances(mesh: &TriMesh, corner: DVec3, spacing: f64, [nx, ny, nz]: [usize; 3]) -> Vec<f64> {
-    let mut distances = Vec::with_capacity(nx * ny * nz);
-    for k in 0..nz {
-        for j in 0..ny {
-            for i in 0..nx {
-                let point = corner + spacing * DVec3::new(i as f64, j as f64, k as f64);
-                let (projection, _) = mesh.project_local_point_and_get_location(point, false);
-                let distance = projection.point.distance(point);
-                distances.push(if projection.is_inside { -distance } else { distance });
-            }
-        }
-    }
-    distances
-}
-
-/// Coefficients of the quadratic spline through given values. Along an axis the spline is `c + (c_- - 2 c + c_+)/8` at a node,
-/// which is solved by sweeps of `c = value - (c_- - 2 c + c_+)/8`; the outermost nodes keep their values.
-fn prefiltered(values: &[f64], nodes: [usize; 3]) -> Vec<f32> {
-    let mut solved = values.to_vec();
-    let strides = [1, nodes[0], nodes[0] * nodes[1]];
-    for axis in 0..3 {
-        let (right, stride) = (solved.clone(), strides[axis]);
-        let mut next = solved.clone();
-        for _ in 0..PREFILTER_SWEEPS {
-            for at in 0..solved.len() {
-                let place = at / stride % nodes[axis];
-                if place > 0 && place + 1 < nodes[axis] {
-                    // Solved for the diagonal, 3/4.
-                    next[at] = (right[at] - (solved[at - stride] + solved[at + stride]) / 8.0) / 0.75;
-                }
-            }
-            std::mem::swap(&mut solved, &mut next);
-        }
-    }
-    solved.into_iter().map(|c| c as f32).collect()
+/// Distance of a point, m, negative inside.
+fn signed_distance(mesh: &TriMesh, point: DVec3) -> f64 {
+    let (projection, _) = mesh.project_local_point_and_get_location(point, false);
+    let distance = projection.point.distance(point);
+    if projection.is_inside { -distance } else { distance }
 }
 
 /// Directions spread evenly over a sphere, along a spiral of the golden angle.

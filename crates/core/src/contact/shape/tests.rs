@@ -69,11 +69,12 @@ fn distances_are_to_a_point_of_the_boundary_and_no_point_is_closer() {
 
 #[test]
 fn gradients_are_those_of_the_distance() {
-    for shape in shapes() {
+    for shape in shapes().into_iter().chain(files()) {
         for (k, direction) in directions(40).enumerate() {
             let point = shape.centre() + direction * shape.bounding_radius() * (0.3 + 0.04 * k as f64);
             let (_, gradient) = shape.signed_distance(point);
-            let h = 1e-8;
+            // Coefficients of splines are single numbers.
+            let h = if matches!(shape, ToolShape::Surface(_)) { 1e-6 } else { 1e-8 };
             let difference = DVec3::from_array(DVec3::AXES.map(|axis| {
                 (shape.signed_distance(point + h * axis).0 - shape.signed_distance(point - h * axis).0) / (2.0 * h)
             }));
@@ -215,21 +216,73 @@ fn sizes_that_are_none_are_refused() {
     assert!(ToolShape::punch(1.0, 1.5).unwrap_err().to_string().contains("more than its radius"));
 }
 
+/// A box of triangles, in the middle of its lengths.
+pub(crate) fn box_mesh(lengths: DVec3) -> (Vec<DVec3>, Vec<[u32; 3]>) {
+    let side = |bit: u32, k: u32| if k >> bit & 1 == 1 { 0.5 } else { -0.5 };
+    let vertices = (0..8).map(|k| lengths * DVec3::new(side(0, k), side(1, k), side(2, k))).collect();
+    let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    (vertices, faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect())
+}
+
+fn from_mesh((vertices, triangles): (Vec<DVec3>, Vec<[u32; 3]>)) -> ToolShape {
+    ToolShape::Surface(Box::new(SurfaceShape::new(&vertices, &triangles).unwrap()))
+}
+
+fn files() -> [ToolShape; 2] {
+    [from_mesh(sphere_mesh(0.008, 4)), from_mesh(box_mesh(DVec3::new(0.008, 0.006, 0.02)))]
+}
+
 #[test]
-fn the_gradient_turns_as_its_differences_do() {
-    for shape in shapes() {
+fn the_rounded_gradient_turns_as_its_differences_do() {
+    for shape in shapes().into_iter().chain(files()) {
         let size = shape.thickness();
         for (k, direction) in directions(60).enumerate() {
             let on = shape.support(direction);
             let point = on + direction * size * (0.01 * k as f64 - 0.15);
-            let (gradient, turning) = shape.turning_gradient(point);
-            assert_eq!(gradient, shape.signed_distance(point).1);
+            let (gradient, turning) = shape.rounded_gradient(point);
+            assert_eq!(gradient, shape.rounded_direction(point, shape.signed_distance(point).1));
             let h = 1e-5 * size;
             for axis in DVec3::AXES {
-                let [ahead, behind] = [h, -h].map(|h| shape.signed_distance(point + h * axis).1);
+                let [ahead, behind] = [h, -h].map(|h| shape.rounded_gradient(point + h * axis).0);
                 let error = ((ahead - behind) / (2.0 * h) - turning * axis).length();
                 assert!(error < 1e-3 * turning.x_axis.length().max(1.0 / size), "{error:e} {shape:?} {point}");
             }
         }
     }
+}
+
+#[test]
+fn sharp_tools_face_as_rounded_ones_do() {
+    let lengths = DVec3::new(0.008, 0.006, 0.02);
+    let (half, sharp) = (0.5 * lengths, from_mesh(box_mesh(lengths)));
+    assert!((sharp.reach() / half.y - 1.0).abs() < 0.05, "{}", sharp.reach());
+    // In the middle of a side it faces away from it, inside and outside.
+    for height in [-0.5, -0.2, 0.0, 0.3] {
+        let (direction, _) = sharp.rounded_gradient(DVec3::Y * half.y * (1.0 + height));
+        assert!(direction.distance(DVec3::Y) < 1e-3, "{height} {direction}");
+    }
+    // Round an edge it turns by 90 degrees, never faster than around a quarter of the reach; the distance itself turns at once.
+    let (mut before, step, steps) = (DVec3::Y, 1e-5, 500);
+    let mut fastest = [0.0f64; 2];
+    let mut exact = DVec3::Y;
+    for k in 0..=2 * steps {
+        let along = step * f64::from(k - steps);
+        let point = half.with_z(0.0) + if k < steps { DVec3::X * along } else { DVec3::NEG_Y * along };
+        let (direction, own) = (sharp.rounded_gradient(point).0, sharp.signed_distance(point).1);
+        fastest = [fastest[0].max(direction.distance(before)), fastest[1].max(own.distance(exact))];
+        (before, exact) = (direction, own);
+    }
+    assert!(before.distance(DVec3::X) < 0.15, "{before}");
+    assert!(fastest[0] < step / (0.25 * sharp.reach()), "{fastest:?}");
+    assert!(fastest[1] > 2.0 * fastest[0], "{fastest:?}");
+    // A ball of triangles faces as a ball does, and a rounded punch as itself.
+    let ball = from_mesh(sphere_mesh(0.008, 4));
+    for (k, direction) in directions(100).enumerate() {
+        let point = direction * 0.008 * (0.6 + 0.006 * k as f64);
+        let off = ball.rounded_gradient(point).0.distance(direction);
+        assert!(off < 0.05, "{point} {off}");
+    }
+    let punch = ToolShape::punch(0.006, 0.004).unwrap();
+    let at = DVec3::new(0.0045, 0.002, -0.0005);
+    assert_eq!(punch.rounded_gradient(at).0, punch.signed_distance(at).1);
 }

@@ -1,5 +1,7 @@
-//! How the gradient of a shape's signed distance turns: the second derivative of the distance, 1/m.
+//! The direction in which a contact may face at a point of a tool: the gradient of its signed distance, with its edges rounded. At a
+//! sharp edge the gradient itself turns over at once.
 //!
+//! How it turns is the second derivative of the distance, 1/m.
 //! Along the gradient `g` it is zero, and across it that of the parallel surface through the point: `1/L` around a point or a line
 //! at the distance `L`, zero over a plane.
 
@@ -12,8 +14,9 @@ use crate::tensor::{across, outer};
 const LEAST_RADIUS: f64 = 1e-3;
 
 impl ToolShape {
-    /// Gradient of the signed distance at a point, and its derivative by the point, 1/m; zero for a surface from a file.
-    pub fn turning_gradient(&self, point: DVec3) -> (DVec3, DMat3) {
+    /// Gradient of the signed distance at a point, as of the shape with edges rounded by half its thickness at least, and its derivative
+    /// by the point, 1/m.
+    pub fn rounded_gradient(&self, point: DVec3) -> (DVec3, DMat3) {
         let least = LEAST_RADIUS * self.thickness();
         match *self {
             Self::Sphere { .. } => around(point, least),
@@ -25,8 +28,21 @@ impl ToolShape {
                 let along = if nearest == point.z { outer(DVec3::Z, DVec3::Z) } else { DMat3::ZERO };
                 (gradient, turning - along * (1.0 / offset.length().max(least)))
             }
-            Self::Punch { radius, rounding } => around_punch((radius, rounding), point, least),
-            Self::Surface(ref surface) => (surface.signed_distance(point).1, DMat3::ZERO),
+            Self::Punch { radius, rounding } => {
+                around_punch((radius, punch::at_least_rounded(radius, rounding)), point, least)
+            }
+            Self::Surface(ref surface) => surface.rounded_gradient(point),
+        }
+    }
+
+    /// The direction of [`ToolShape::rounded_gradient`] where the gradient of the signed distance is known.
+    pub fn rounded_direction(&self, point: DVec3, gradient: DVec3) -> DVec3 {
+        match *self {
+            Self::Punch { radius, rounding } => {
+                punch::signed_distance(radius, punch::at_least_rounded(radius, rounding), point).1
+            }
+            Self::Surface(ref surface) => surface.rounded_direction(point).0,
+            _ => gradient,
         }
     }
 }

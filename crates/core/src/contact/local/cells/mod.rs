@@ -58,6 +58,8 @@ pub struct CellProblem<'a> {
     pub pose: ToolPose,
     /// The plane of the contact: no lower than any point that the tool touches.
     pub plane: ContactPlane,
+    /// Extents of the surface on a crest, beside those of the tool (`contact::footprint`); zero elsewhere.
+    pub crest: DMat3,
     /// `E*`, Pa.
     pub effective_modulus: f64,
     /// Resolution of the grid.
@@ -155,6 +157,8 @@ pub struct CellContact {
     pub body_force: DVec3,
     /// Gradient of the energy by a rotation of the body about the plane's origin, N m.
     pub body_torque: DVec3,
+    /// Derivative of the energy by the extents of a crest, J.
+    pub energy_by_crest: DMat3,
     /// Convergence of the solution.
     pub convergence: Convergence,
 }
@@ -193,6 +197,7 @@ impl CellProblem<'_> {
             shape: self.shape,
             rotation: to_plane * DMat3::from_quat(self.pose.rotation),
             tip: to_plane * (self.pose.position - self.plane.origin),
+            crest: to_plane * self.crest * self.plane.axes,
         };
         let depth = -tool.support(DVec3::NEG_Z).z;
         if !(depth > 0.0 && depth.is_finite()) {

@@ -21,7 +21,8 @@ fn pressed(shape: &ToolShape, angles: DVec3, depth: f64) -> CellProblem<'_> {
     let rotation = DQuat::from_euler(EulerRot::XYZ, angles.x, angles.y, angles.z);
     let lowest = rotation * shape.support(rotation.inverse() * DVec3::NEG_Z);
     let pose = ToolPose { position: DVec3::NEG_Z * depth - lowest, rotation };
-    CellProblem { shape, pose, plane: plane(), effective_modulus: MODULUS, resolution: Resolution::Fine, width: 1.0 }
+    let (plane, crest) = (plane(), DMat3::ZERO);
+    CellProblem { shape, pose, plane, crest, effective_modulus: MODULUS, resolution: Resolution::Fine, width: 1.0 }
 }
 
 fn cold(problem: &CellProblem) -> CellContact {
@@ -128,6 +129,7 @@ fn the_side_of_a_capsule_presses_like_a_cylinder() {
         shape: &shape,
         rotation: DMat3::from_quat(problem.pose.rotation),
         tip: problem.pose.position,
+        crest: DMat3::ZERO,
     };
     let cells = Cells::new(tool.rectangle(), MAX_CELLS, MODULUS);
     let load = contact.normal_force * share / cells.sides[0];

@@ -137,6 +137,7 @@ impl CellScratch {
         for vector in [&mut contact.force, &mut contact.torque, &mut contact.body_force, &mut contact.body_torque] {
             *vector = plane.axes * *vector;
         }
+        contact.energy_by_crest = plane.axes * contact.energy_by_crest * plane.axes.transpose();
         contact
     }
 
@@ -178,6 +179,9 @@ impl ByPlace {
                 by_angle += share * side.point.dot(rotated_axes[k]);
             }
         }
-        contact.torque -= by_angle * cells.rectangle.angle_by_rotation;
+        let [by_tool, by_surface] = cells.rectangle.angle_by_rotation;
+        contact.torque -= by_angle * by_tool;
+        contact.body_torque += by_angle * by_surface;
+        contact.energy_by_crest = cells.rectangle.angle_by_crest * by_angle;
     }
 }

@@ -20,7 +20,7 @@ pub struct LocalBody<'a> {
     pub series: Option<&'a [SeriesFields]>,
     /// The surface in pieces, for a tool that is not a sphere.
     pub pressed_surface: Option<&'a PressedSurface>,
-    /// Its sharp convex corners, for a sphere.
+    /// Its sharp convex corners and blades, for a sphere.
     pub corners: Option<&'a CornerSurface>,
     /// Its sharp convex edges, for a sphere.
     pub edges: Option<&'a ConvexEdges>,

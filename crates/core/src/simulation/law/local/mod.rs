@@ -341,10 +341,10 @@ impl Law for Local {
         contact.force == DVec3::ZERO && !contact.additional
     }
 
-    fn store_entry_depth(&self, _model: &Model, state: &mut State, contact: &Contact) {
+    fn store_entry_depth(&self, model: &Model, state: &mut State, contact: &Contact) {
         let entry = &mut state.tools[contact.tool].entry[contact.body];
         // The next contact begins no higher than this one: its approach may have been reduced.
-        entry.previous = contact.depth.max(0.0);
+        entry.previous = near_corner::last_depth(model, contact).max(0.0);
         entry.threshold = entry.threshold.max(contact.local.entry_depth);
     }
 

@@ -1,4 +1,4 @@
-//! A sphere near a sharp convex corner: partly the closed form, partly pressure cells (`contact::CornerSurface`).
+//! A sphere near a sharp convex corner or a blade: partly the closed form, partly pressure cells (`contact::CornerSurface`).
 //!
 //! With the share `s(p')` of cells the energies of the half-space and of the body are means,
 //!
@@ -31,6 +31,17 @@ fn share_of_cells(corners: Option<&CornerSurface>, is_fading: bool, triangle: u3
 pub fn share_of_contact(model: &Model, contact: &Contact) -> f64 {
     let (corners, local) = (model.corner_surfaces[contact.tool][contact.body].as_deref(), &contact.local);
     share_of_cells(corners, local.is_fading, local.foot.triangle, local.relative_position).0
+}
+
+/// Depth from which the next contact of the tool may begin after this one, m. On cells a sphere may lie over a sharp edge and overlap no
+/// cell yet, but the next contact counts from its closest point.
+pub fn last_depth(model: &Model, contact: &Contact) -> f64 {
+    let (tool, body) = (&model.tools[contact.tool], &model.bodies[contact.body]);
+    if tool.shape.needs_cells() || share_of_contact(model, contact) == 0.0 {
+        return contact.depth;
+    }
+    let closest = body.closest(contact.local.relative_position);
+    closest.map_or(contact.depth, |closest| contact.depth.max(tool.radius - closest.signed_distance))
 }
 
 /// Whether a contact needs pressure cells.

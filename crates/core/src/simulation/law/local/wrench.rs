@@ -57,6 +57,7 @@ pub fn largest_overlap(
         shape,
         pose: ToolPose { position: place, rotation },
         plane: ContactPlane::new(footprint.origin, footprint.normal),
+        crest: crest_extents(footprint),
         // The gaps do not depend on these.
         effective_modulus: 1.0,
         width: 1.0,
@@ -82,6 +83,7 @@ pub fn indent_shape(
         shape: tool.shape,
         pose: ToolPose { position, rotation: contact.orientation },
         plane: ContactPlane::new(footprint.origin, normal),
+        crest: crest_extents(footprint),
         effective_modulus: half_space.modulus,
         resolution: cells.resolution,
         width: half_space.width,
@@ -94,6 +96,8 @@ pub fn indent_shape(
     let stiffer = pressed.energy / half_space.modulus;
     let [by_place, by_rotation] =
         [0, 1].map(|k| footprint.origin_by[k].transpose() * by_origin + footprint.normal_by[k].transpose() * by_normal);
+    let by_crest = footprint.crest.map(|crest| cells.footprint.crest_by(&crest, &pressed.energy_by_crest));
+    let by_crest = by_crest.unwrap_or_default();
     let linear = Indentation {
         force: pressed.normal_force,
         material: half_space.material,
@@ -103,9 +107,11 @@ pub fn indent_shape(
         energy: pressed.energy,
         gradient: by_place - pressed.force
             + half_space.slope * stiffer
-            + half_space.width_slope * pressed.energy_by_width,
+            + half_space.width_slope * pressed.energy_by_width
+            + by_crest[0],
         torque: pressed.torque
             - by_rotation
+            - by_crest[1]
             - modulus_by_rotation * stiffer
             - width_by_rotation * pressed.energy_by_width,
         lever: if pressed.normal_force > 0.0 { pressed.centre_of_pressure - place } else { DVec3::ZERO },
@@ -113,6 +119,10 @@ pub fn indent_shape(
     };
     let rotation = DMat3::from_quat(contact.orientation);
     correct_shape(linear, (tool.shape, rotation), half_space, footprint, modulus_by_rotation)
+}
+
+fn crest_extents(footprint: &Footprint) -> DMat3 {
+    footprint.crest.map_or(DMat3::ZERO, |crest| crest.extents)
 }
 
 #[cfg(test)]
@@ -263,6 +273,24 @@ mod tests {
                 let lowest = orientation * shape.support(orientation.conjugate() * -towards);
                 let place = DVec3::new(1.0, 0.52, 1.0) - lowest - 0.04 * towards;
                 check(&body, &shape, (place, orientation), 0.15);
+            }
+        }
+    }
+
+    /// Its face is round, so its angle about its axis makes no difference. Cells obliquely over the edge would not resolve it.
+    #[test]
+    fn a_punch_that_spins_on_an_edge_keeps_its_force() {
+        let body = Body::new(cube());
+        let punch = ToolShape::punch(0.1, 0.03).expect("a shape");
+        for angle in [0.2f64, 0.5, 0.785] {
+            let towards = DVec3::new(angle.sin(), 0.0, angle.cos());
+            let lean = DQuat::from_rotation_arc(DVec3::Z, towards);
+            let lowest = lean * punch.support(lean.conjugate() * -towards);
+            let place = DVec3::new(1.0, 0.52, 1.0) - lowest - 0.01 * towards;
+            let force = |spin: f64| body.press(&punch, place, lean * DQuat::from_rotation_z(spin)).indentation.force;
+            for spin in [0.3, 0.8, 1.3] {
+                let ratio = force(spin) / force(0.0);
+                assert!((ratio - 1.0).abs() < 0.03, "{angle} {spin} {ratio}");
             }
         }
     }
