@@ -136,28 +136,32 @@ impl PlacedShape<'_> {
         centre + self.contact_normal * (self.penetration - UNLIFTED_DEPTH * half).max(0.0)
     }
 
-    /// Distance of a point from the tool, its derivatives by position and rotation, and the tool's normal there, from the point
-    /// towards the tool.
-    fn distance(&self, point: DVec3, centre: DVec3, headroom: f64) -> (f64, [DVec3; 2], DVec3) {
+    /// Distance of a point from the tool, and its derivatives by position and rotation.
+    fn distance(&self, point: DVec3, centre: DVec3, headroom: f64) -> (f64, [DVec3; 2]) {
         let arm = centre - self.position;
         let above = (point - centre).dot(self.contact_normal).max(0.0);
         let at = point - self.contact_normal * above;
-        let in_tool = self.rotation.transpose() * (at - self.position);
-        let (mut distance, gradient) = self.shape.signed_distance(in_tool);
-        let rounded = self.rotation * self.shape.rounded_direction(in_tool, gradient);
+        let (mut distance, gradient) = self.shape.signed_distance(self.rotation.transpose() * (at - self.position));
         let gradient = self.rotation * gradient;
         let mut by_pose = [-gradient, gradient.cross(at - self.position)];
         // The height of the middle moves with the tool.
         let mut rise = if above > 0.0 { gradient.dot(self.contact_normal) } else { 0.0 };
-        let lifted = if above > 0.0 { rounded.dot(self.contact_normal) } else { 0.0 };
-        let normal = self.contact_normal * lifted - rounded;
         if above > headroom {
             distance += HEADROOM_SLOPE * (above - headroom);
             rise -= HEADROOM_SLOPE;
         }
         by_pose[0] += self.contact_normal * rise;
         by_pose[1] += arm.cross(self.contact_normal) * rise;
-        (distance, by_pose, normal)
+        (distance, by_pose)
+    }
+
+    /// The tool's normal at a point, from the point towards the tool.
+    fn direction(&self, point: DVec3, centre: DVec3) -> DVec3 {
+        let normal = self.contact_normal;
+        let above = (point - centre).dot(normal);
+        let at = point - normal * above.max(0.0) - self.position;
+        let gradient = self.rotation * self.shape.rounded_direction(self.rotation.transpose() * at);
+        if above > 0.0 { normal * gradient.dot(normal) - gradient } else { -gradient }
     }
 
     /// The tool's normal at a point, and its derivatives by position and rotation.
@@ -289,14 +293,14 @@ struct View<'a> {
 }
 
 impl View<'_> {
-    fn distance(&self, point: DVec3) -> (f64, [DVec3; 2], DVec3) {
+    fn distance(&self, point: DVec3) -> (f64, [DVec3; 2]) {
         self.tool.distance(point, self.centre, self.headroom)
     }
 
     /// A piece within a margin of the tool.
     fn near_piece(&self, fine: &Tessellation, piece: u32, margin: f64) -> Option<NearPiece> {
         let &Piece { middle, normal, area, size } = fine.piece(piece);
-        let (distance, by_pose, tool_normal) = self.distance(middle);
+        let (distance, by_pose) = self.distance(middle);
         if distance.is_nan() || distance >= size + margin {
             return None;
         }
@@ -311,7 +315,11 @@ impl View<'_> {
             contact_share: 1.0,
             distance,
             by_pose,
-            tool_normal,
+            // Farther away it counts nothing until the next search.
+            tool_normal: match distance < margin + MOVED * self.tool.shape.thickness() {
+                true => self.tool.direction(middle, self.centre),
+                false => DVec3::ZERO,
+            },
             facing,
             facing_by,
         })

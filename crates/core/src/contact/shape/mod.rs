@@ -213,7 +213,7 @@ impl ToolShape {
         match *self {
             Self::Sphere { radius } | Self::Capsule { radius, .. } | Self::Punch { radius, .. } => radius,
             Self::Ellipsoid { semi_axes } => semi_axes.min_element(),
-            Self::Surface(ref surface) => surface.thickness(),
+            Self::Surface(ref surface) => surface.thickness,
         }
     }
 

@@ -40,6 +40,8 @@ pub struct SurfaceShape {
     distance: Spline,
     /// The same with all edges rounded.
     rounded: Spline,
+    /// Half its width where it is narrowest along an axis, m.
+    pub(super) thickness: f64,
     /// Radius of the largest ball inside, m.
     pub(super) inner_radius: f64,
     /// Vertices that reach farthest in some direction, m.
@@ -86,6 +88,7 @@ impl SurfaceShape {
             hull_margin: hull_margin(used, &extreme_points) + OVERSHOOT * spacing,
             distance: Spline::through(grid, &distances),
             rounded: Spline::past(coarser, &rounded),
+            thickness: 0.5 * (high - low).min_element(),
             inner_radius,
             extreme_points,
             centre,
@@ -120,12 +123,6 @@ impl SurfaceShape {
         // Along axes on which the point is beyond the grid the nearest one stays.
         let moves = DMat3::from_diagonal(DVec3::select(point.cmpeq(inside), DVec3::ONE, DVec3::ZERO));
         (direction, across(direction) * self.rounded.second_derivative(inside) * moves * (1.0 / slope))
-    }
-
-    /// Half its width where it is narrowest along an axis, m.
-    pub(super) fn thickness(&self) -> f64 {
-        let widths = DVec3::AXES.map(|axis| (self.support(axis) - self.support(-axis)).dot(axis));
-        0.5 * widths.into_iter().fold(f64::INFINITY, f64::min)
     }
 
     /// Farthest of the stored vertices, moved outwards by the largest distance of the others from their hull: no point of the

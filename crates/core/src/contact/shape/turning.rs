@@ -35,14 +35,14 @@ impl ToolShape {
         }
     }
 
-    /// The direction of [`ToolShape::rounded_gradient`] where the gradient of the signed distance is known.
-    pub fn rounded_direction(&self, point: DVec3, gradient: DVec3) -> DVec3 {
+    /// The direction of [`ToolShape::rounded_gradient`] alone.
+    pub fn rounded_direction(&self, point: DVec3) -> DVec3 {
         match *self {
             Self::Punch { radius, rounding } => {
                 punch::signed_distance(radius, punch::at_least_rounded(radius, rounding), point).1
             }
             Self::Surface(ref surface) => surface.rounded_direction(point).0,
-            _ => gradient,
+            _ => self.signed_distance(point).1,
         }
     }
 }
