@@ -225,9 +225,9 @@ impl ToolShape {
             Self::Sphere { .. } => along(DVec3::Z) * ROUND_EXTENT,
             // One that stands upright is round too, and the cells have to keep a direction. Between the axes of the tool: edges are
             // often parallel to these, and a row of cells that passes an edge at once has no exact gradient.
-            Self::Capsule { .. } | Self::Punch { .. } => {
-                along(DVec3::Z) + along(DVec3::new(0.8, 0.6, 0.0)) * ROUND_EXTENT
-            }
+            Self::Capsule { .. } => along(DVec3::Z) + along(DVec3::new(0.8, 0.6, 0.0)) * ROUND_EXTENT,
+            // Along an axis of the tool, the cells end with a grid of taxels.
+            Self::Punch { .. } => along(DVec3::Z) + along(DVec3::X) * ROUND_EXTENT,
             // That of its shadow.
             Self::Ellipsoid { semi_axes } => {
                 let parts = semi_axes / semi_axes.max_element();
