@@ -177,7 +177,7 @@ def test_a_packed_scene_is_whole_or_refused(prefix, packed, tmp_path):
     program = compiled(prefix, ROOT / "examples/cpp/render_loop.cpp")
     copy = tmp_path / "copy.pack"
     for name, change, words in (
-        ("scene.json", lambda data: data.replace(b'"version": 2', b'"version": 9'), "version 9"),
+        ("scene.json", lambda data: data.replace(b'"version": ', b'"version": 9'), "version 9"),
         ("scene.json", lambda data: data.replace(b"body-0.palpate", b"../../b.palpate"), "outside of itself"),
         ("scene.json", lambda data: data.replace(b'"key": "', b'"key": "0'), "another body"),
         ("body-0.arrays.safetensors", lambda data: data[:-1] + bytes([data[-1] ^ 1]), "checksum differs"),
@@ -186,7 +186,9 @@ def test_a_packed_scene_is_whole_or_refused(prefix, packed, tmp_path):
         shutil.rmtree(copy, ignore_errors=True)
         shutil.copytree(packed, copy)
         file = copy / name
-        changed = change(file.read_bytes())
+        data = file.read_bytes()
+        changed = change(data)
+        assert changed != data
         file.unlink()
         file.write_bytes(changed)
         done = subprocess.run([program, copy], capture_output=True, text=True, timeout=60)

@@ -209,6 +209,8 @@ impl ToolShape {
     }
 
     /// Half its width where it is narrowest, m.
+    // Inlined, the lengths of other kinds are read before the kind is looked at: without effect, but valgrind reports it.
+    #[inline(never)]
     pub fn thickness(&self) -> f64 {
         match *self {
             Self::Sphere { radius } | Self::Capsule { radius, .. } | Self::Punch { radius, .. } => radius,
