@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 import scipy.linalg
@@ -26,19 +27,24 @@ import scipy.sparse
 from scipy.optimize import nnls
 from scipy.spatial.transform import Rotation
 
+import palpate
 from palpate.body import Body, Material
 from palpate.green import GreensFunction
 from palpate.mesh import TetMesh
 from palpate.mesh.elements import FACE_TRIANGLES
 from palpate.mesh.files import FROM_NETGEN
 from palpate.mesh.shape_functions import TRIANGLE_NODES
+from palpate.scene import BuiltScene
 from palpate.validation.verify.benchmark import green_of, quiet_body
+from palpate.validation.verify.contact.loop import UNLIMITED
 
 SOFT = Material(10e3, 0.45)
 PLANE_MODULUS = 10e3 / (1 - 0.45**2)
 # The block reaches from the edge at x = z = 0 so far towards -x and -z, and half as long along the edge, m.
 WIDTH, HALF_LENGTH = 0.05, 0.03
 MILLIMETRE = 1e-3
+# Steps in which the force loop's tool comes to its depth, m.
+STEP = 10e-6
 # The distance of points outside of a tool, m, and its gradient, both in the tool's frame.
 Distance = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
@@ -122,6 +128,31 @@ def _meshed(shape, coarsest: float) -> TetMesh:
     points = MILLIMETRE * np.array([point.p for point in mesh.Points()])
     tets = np.array([[point.nr - 1 for point in element.points] for element in mesh.Elements3D()])
     return TetMesh(points, tets[:, FROM_NETGEN[10]])
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A tool at first touch: its table, its shape, how it is turned, and its origin, m."""
+
+    tool: dict[str, Any]
+    shape: Distance
+    rotation: Rotation
+    start: np.ndarray
+
+
+def loop_forces(built: tuple[Body, GreensFunction], placed: Placed, way: np.ndarray, depths: np.ndarray) -> np.ndarray:
+    """Forces (n, 3), N, of the loop on a tool without friction that is pressed against ``way`` to depths (n,), m."""
+    tool = {**placed.tool, "friction": 0.0}
+    scene = palpate.Scene(body={"store": "block.palpate"}, tool=tool, device=UNLIMITED, view={"strain_limit": 0})
+    down = np.arange(-1e-3, depths[-1] + STEP / 2, STEP)
+    path = placed.start - down[:, None] * way
+    turned = np.tile(np.roll(placed.rotation.as_quat(), 1), (len(path), 1))
+    forces = palpate.Simulation(BuiltScene.of(scene, *built)).play(path, turned).computed_forces
+    return forces[np.searchsorted(down, depths - STEP / 2)]
+
+
+def within(forces: np.ndarray, expected: np.ndarray, tolerance: float) -> np.ndarray:
+    return np.abs(forces / expected - 1) <= tolerance
 
 
 def outward(degrees: float) -> np.ndarray:

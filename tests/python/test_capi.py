@@ -191,7 +191,7 @@ def test_a_packed_scene_is_whole_or_refused(prefix, packed, tmp_path):
         assert changed != data
         file.unlink()
         file.write_bytes(changed)
-        done = subprocess.run([program, copy], capture_output=True, text=True, timeout=60)
+        done = subprocess.run([program, copy], cwd=tmp_path, capture_output=True, text=True, timeout=60)
         assert done.returncode == 2 and words in done.stderr and done.stderr.count("\n") == 1, done.stderr
     with pytest.raises(palpate.SceneError, match="something else"):
         palpate.pack(palpate.Scene.of_store(packed / "body-0.palpate"), tmp_path)

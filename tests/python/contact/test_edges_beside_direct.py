@@ -11,16 +11,14 @@ from typing import Any
 import edge_block
 import numpy as np
 import pytest
-from edge_block import Distance, Region
+from edge_block import Distance, Placed, Region, within
 from scipy.spatial.transform import Rotation
 
 import palpate
-from palpate.scene import BuiltScene
 from palpate.validation.verify.contact import closed_forms
-from palpate.validation.verify.contact.loop import UNLIMITED
 
 DEPTHS = np.array([0.5e-3, 1e-3, 1.5e-3])
-ELEMENT, STEP = 6e-3, 10e-6
+ELEMENT = 6e-3
 UP = np.array([0.0, 0.0, 1.0])
 OUT = np.array([1.0, 0.0, 1.0]) / np.sqrt(2)
 # Radius of the round edge, m, and 0 for the sharp one; largest difference from the direct solution.
@@ -102,18 +100,9 @@ def block(request, tmp_path_factory) -> tuple[float, palpate.Body, palpate.Green
 
 def pressed(block, pose: Pose) -> np.ndarray:
     """Forces of the loop along the way, N, at the depths."""
-    rounding, body, green = block
-    tool = {**pose.tool, "friction": 0.0}
-    scene = palpate.Scene(body={"store": "block.palpate"}, tool=tool, device=UNLIMITED, view={"strain_limit": 0})
-    down = np.arange(-1e-3, DEPTHS[-1] + STEP / 2, STEP)
-    path = pose.start(rounding) - down[:, None] * pose.way
-    turned = np.tile(np.roll(pose.rotation.as_quat(), 1), (len(path), 1))
-    forces = palpate.Simulation(BuiltScene.of(scene, body, green)).play(path, turned).computed_forces
-    return forces[np.searchsorted(down, DEPTHS - STEP / 2)] @ pose.way
-
-
-def within(forces: np.ndarray, direct: np.ndarray, tolerance: float) -> np.ndarray:
-    return np.abs(forces / direct - 1) <= tolerance
+    rounding, *built = block
+    placed = Placed(pose.tool, pose.shape, pose.rotation, pose.start(rounding))
+    return edge_block.loop_forces(built, placed, pose.way, DEPTHS) @ pose.way
 
 
 @pytest.mark.quick(5)

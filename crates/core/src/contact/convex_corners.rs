@@ -16,7 +16,7 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 
 use super::footprint::{PressedSurface, smooth_step};
-use super::sharp_edge::{convex_edges, keep_long};
+use super::sharp_edge::{Edge, convex_edges, keep_long};
 use super::smooth::SmoothSurface;
 use super::{SurfaceQuery, TriangleLists};
 use crate::math::atan2;
@@ -47,8 +47,8 @@ pub struct CornerSurface {
     corners: Vec<DVec3>,
     /// Those near each drawn triangle.
     near: TriangleLists,
-    /// Ends of the pieces of blades, m.
-    blades: Vec<[DVec3; 2]>,
+    /// Pieces of blades.
+    blades: Vec<Edge>,
     /// Those near each drawn triangle.
     near_blades: TriangleLists,
     radius: f64,
@@ -65,21 +65,17 @@ impl CornerSurface {
         if corners.is_empty() && blades.is_empty() {
             return None;
         }
-        let [reach, far] = [LISTED, LISTED_BLADE].map(|reach| DVec3::splat(reach * radius));
-        let around = |&corner: &DVec3| [corner - reach, corner + reach];
-        let along = |&[first, second]: &[DVec3; 2]| [first.min(second) - far, first.max(second) + far];
-        let near = TriangleLists::new(surface, query, corners.iter().map(around));
-        let near_blades = TriangleLists::new(surface, query, blades.iter().map(along));
+        let reach = DVec3::splat(LISTED * radius);
+        let near = TriangleLists::new(surface, query, corners.iter().map(|&corner| [corner - reach, corner + reach]));
+        let boxes = blades.iter().map(|blade| blade.box_around(LISTED_BLADE * radius));
+        let near_blades = TriangleLists::new(surface, query, boxes);
         Some(Self { pressed: pressed(), corners, near, blades, near_blades, radius })
     }
 
     /// Share of cells in the contact of a sphere at a position near a triangle, and its gradient, 1/m.
     pub fn share(&self, triangle: u32, position: DVec3) -> (f64, DVec3) {
         let corners = self.near.at(triangle).iter().map(|&corner| position - self.corners[corner as usize]);
-        let from_blade = |&piece: &u32| {
-            let [first, second] = self.blades[piece as usize];
-            position - closest_on_segment(first, second, position)
-        };
+        let from_blade = |&piece: &u32| position - self.blades[piece as usize].closest(position);
         let (corner, by_corner) = self.share_at(corners, NEAR);
         let (blade, by_blade) = self.share_at(self.near_blades.at(triangle).iter().map(from_blade), NEAR_BLADE);
         (corner + blade - corner * blade, by_corner * (1.0 - blade) + by_blade * (1.0 - corner))
@@ -106,17 +102,11 @@ impl CornerSurface {
 }
 
 /// Pieces of sharp edges so thin that a sphere's closed form is that of another body.
-fn blades(surface: &Surface, smooth: &SmoothSurface, radius: f64) -> Vec<[DVec3; 2]> {
+fn blades(surface: &Surface, smooth: &SmoothSurface, radius: f64) -> Vec<Edge> {
     let mut edges = convex_edges(surface, smooth);
     edges.retain(|edge| edge.turn > BLADE);
     keep_long(&mut edges, radius);
-    edges.into_iter().map(|edge| edge.ends).collect()
-}
-
-/// The point of a segment that is closest to a position.
-fn closest_on_segment(first: DVec3, second: DVec3, position: DVec3) -> DVec3 {
-    let along = second - first;
-    first + along * ((position - first).dot(along) / along.length_squared()).clamp(0.0, 1.0)
+    edges
 }
 
 /// Positions of the nodes in which several creases meet whose faces turn away from each other, m.

@@ -241,12 +241,8 @@ impl ConvexEdges {
         if edges.is_empty() {
             return None;
         }
-        let listed = |reach: f64| {
-            let reach = DVec3::splat(reach * radius);
-            let around =
-                |&Edge { ends: [first, second], .. }: &Edge| [first.min(second) - reach, first.max(second) + reach];
-            TriangleLists::new(surface, query, edges.iter().map(around))
-        };
+        let listed =
+            |reach: f64| TriangleLists::new(surface, query, edges.iter().map(|edge| edge.box_around(reach * radius)));
         let (near, around) = (listed(LISTED), listed(LISTED_AROUND));
         let ending = |at: DVec3| {
             let ends = move |edge: &&Edge| (0..2).any(|k| edge.is_last[k] && edge.ends[k] == at);

@@ -36,11 +36,22 @@ pub struct Edge {
 }
 
 impl Edge {
-    /// Squared distance of a point, m^2.
-    pub fn distance_squared(&self, point: DVec3) -> f64 {
+    /// Its point that is closest to another one.
+    pub fn closest(&self, point: DVec3) -> DVec3 {
         let length = self.ends[0].distance(self.ends[1]);
         let at = (point - self.ends[0]).dot(self.along).clamp(0.0, length);
-        point.distance_squared(self.ends[0] + self.along * at)
+        self.ends[0] + self.along * at
+    }
+
+    /// Squared distance of a point, m^2.
+    pub fn distance_squared(&self, point: DVec3) -> f64 {
+        point.distance_squared(self.closest(point))
+    }
+
+    /// Opposite corners of a box that holds all within a distance, m.
+    pub fn box_around(&self, reach: f64) -> [DVec3; 2] {
+        let ([first, second], reach) = (self.ends, DVec3::splat(reach));
+        [first.min(second) - reach, first.max(second) + reach]
     }
 }
 

@@ -157,11 +157,15 @@ impl PlacedShape<'_> {
 
     /// The tool's normal at a point, from the point towards the tool.
     fn direction(&self, point: DVec3, centre: DVec3) -> DVec3 {
-        let normal = self.contact_normal;
-        let above = (point - centre).dot(normal);
-        let at = point - normal * above.max(0.0) - self.position;
+        let (is_above, at) = self.lowered(point, centre);
         let gradient = self.rotation * self.shape.rounded_direction(self.rotation.transpose() * at);
-        if above > 0.0 { normal * gradient.dot(normal) - gradient } else { -gradient }
+        if is_above { self.contact_normal * gradient.dot(self.contact_normal) - gradient } else { -gradient }
+    }
+
+    /// Whether a point lies above the tool's middle, and the offset from the tool's position of the point, lowered to the middle then.
+    fn lowered(&self, point: DVec3, centre: DVec3) -> (bool, DVec3) {
+        let above = (point - centre).dot(self.contact_normal);
+        (above > 0.0, point - self.contact_normal * above.max(0.0) - self.position)
     }
 
     /// The tool's normal at a point, and its derivatives by position and rotation.
@@ -170,12 +174,11 @@ impl PlacedShape<'_> {
     /// tool's middle, the normal is `-P g`.
     fn normal(&self, point: DVec3, centre: DVec3) -> (DVec3, [DMat3; 2]) {
         let normal = self.contact_normal;
-        let above = (point - centre).dot(normal);
-        let at = point - normal * above.max(0.0) - self.position;
+        let (is_above, at) = self.lowered(point, centre);
         let (gradient, turning) = self.shape.rounded_gradient(self.rotation.transpose() * at);
         let turning = self.rotation * turning * self.rotation.transpose();
         let gradient = self.rotation * gradient;
-        if above <= 0.0 {
+        if !is_above {
             return (-gradient, [turning, skew(gradient) - turning * skew(at)]);
         }
         let level = across(normal);

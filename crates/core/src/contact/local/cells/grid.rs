@@ -1,13 +1,13 @@
 //! Rectangle of the cells on the tangent plane: the smallest that contains the part of the tool below that plane.
 //!
-//! The rectangle moves with the tool, turns with its longest axis in the plane or with a crest below and grows with its depth, so that cells are as fine as the
-//! contact allows, and a tool that slides over a plane meets the same cells everywhere. Its motion is part of the
+//! The rectangle moves with the tool, turns with its longest axis in the plane or with a crest below, and grows with its depth, so that
+//! cells are as fine as the contact allows, and a tool that slides over a plane meets the same cells everywhere. Its motion is part of the
 //! energy's gradient. Its sides are found by duality: for a convex body with the support function `h`, the largest
 //! coordinate along `e` of its points below the plane is `min h(e - mu n)` over `mu >= 0`, least where the support lies in
 //! the plane. A minimum changes with the pose as if `mu` were constant. In a hollow the contact may be wider: up to half
 //! the tool's curvature all of it is still within.
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 
 use super::super::super::shape::ToolShape;
 use crate::math::hypot;
@@ -25,7 +25,7 @@ const LEAST_SINE: f64 = 1e-3;
 
 /// `o`: the grid lies obliquely over a crest by a fourth of this number's angle, 0.01. A row of cells that passes a crest at once has
 /// no exact gradient.
-const OBLIQUE: Parts = Parts(0.9992001066609779, 0.03998933418663416);
+const OBLIQUE: DVec2 = DVec2::new(0.9992001066609779, 0.03998933418663416);
 
 /// A side of the rectangle.
 #[derive(Clone, Copy, Debug, Default)]
@@ -93,23 +93,24 @@ impl ToolInSurfaceFrame<'_> {
     /// and of the four angles it is the one next to the tool's own axis.
     fn axes(&self) -> Rectangle {
         let of_tool = self.rotation * self.shape.extents() * self.rotation.transpose();
-        let own = Parts::of(&of_tool);
-        let (squared, of_surface) = (own.squared(), Parts::of(&self.crest));
-        let both = squared.plus(of_surface.squared().times(OBLIQUE));
-        let size = both.size();
+        let (own, of_surface) = (parts(&of_tool), parts(&self.crest));
+        let squared = own.rotate(own);
+        let both = squared + of_surface.rotate(of_surface).rotate(OBLIQUE);
+        let size = hypot(both.x, both.y);
         if size <= LEAST_SINE.powi(4) {
             return Rectangle { axes: [DVec3::X, DVec3::Y], ..Rectangle::default() };
         }
-        let beside = if own.size() > 0.0 { both.times(squared.conjugate()) } else { both };
-        let turn = beside.halved().halved();
-        let first = if own.size() > 0.0 { own.halved().times(turn) } else { turn };
+        let first = match own == DVec2::ZERO {
+            true => halved(halved(both)),
+            false => halved(own).rotate(halved(halved(both.rotate(conjugate(squared))))),
+        };
         let [by_tool, by_crest] =
-            [own, of_surface.times(OBLIQUE)].map(|parts| parts.times(both.conjugate()).scaled(0.5 / (size * size)));
-        let first = DVec3::new(first.0, first.1, 0.0);
+            [own, of_surface.rotate(OBLIQUE)].map(|parts| parts.rotate(conjugate(both)) * (0.5 / (size * size)));
+        let first = first.extend(0.0);
         Rectangle {
             axes: [first, DVec3::Z.cross(first)],
-            angle_by_rotation: [by_tool.by_rotation(&of_tool), by_crest.by_rotation(&self.crest)],
-            angle_by_crest: by_crest.by_extents(),
+            angle_by_rotation: [by_rotation(by_tool, &of_tool), by_rotation(by_crest, &self.crest)],
+            angle_by_crest: by_extents(by_crest),
             ..Rectangle::default()
         }
     }
@@ -186,62 +187,37 @@ impl RectangleSide {
     }
 }
 
-/// A complex number: `M_11 - M_22 + 2 i M_12` of extents, and what is computed from it.
-#[derive(Clone, Copy)]
-struct Parts(f64, f64);
+/// `M_11 - M_22 + 2 i M_12` of extents, a complex number as those below: [`DVec2::rotate`] multiplies them.
+fn parts(extents: &DMat3) -> DVec2 {
+    DVec2::new(extents.x_axis.x - extents.y_axis.y, 2.0 * extents.x_axis.y)
+}
 
-impl Parts {
-    fn of(extents: &DMat3) -> Self {
-        Self(extents.x_axis.x - extents.y_axis.y, 2.0 * extents.x_axis.y)
-    }
+fn conjugate(number: DVec2) -> DVec2 {
+    DVec2::new(number.x, -number.y)
+}
 
-    fn size(self) -> f64 {
-        hypot(self.0, self.1)
+/// The unit number of half the angle, whose real part is not negative.
+fn halved(number: DVec2) -> DVec2 {
+    let DVec2 { x: cos, y: sin } = number * (1.0 / hypot(number.x, number.y));
+    if cos >= 0.0 {
+        let half = (0.5 * (1.0 + cos)).sqrt();
+        return DVec2::new(half, 0.5 * sin / half);
     }
+    let half = (0.5 * (1.0 - cos)).sqrt();
+    DVec2::new(0.5 * sin.abs() / half, half.copysign(sin))
+}
 
-    fn plus(self, other: Self) -> Self {
-        Self(self.0 + other.0, self.1 + other.1)
-    }
+/// Derivative of `Im(k q)` by a rotation of the extents, for a constant `k`.
+fn by_rotation(k: DVec2, extents: &DMat3) -> DVec3 {
+    let (first, second) = (extents.x_axis, extents.y_axis);
+    let real = (first.cross(DVec3::X) - second.cross(DVec3::Y)) * 2.0;
+    let imaginary = (second.cross(DVec3::X) + first.cross(DVec3::Y)) * 2.0;
+    real * k.y + imaginary * k.x
+}
 
-    fn times(self, other: Self) -> Self {
-        Self(self.0 * other.0 - self.1 * other.1, self.0 * other.1 + self.1 * other.0)
-    }
-
-    fn squared(self) -> Self {
-        self.times(self)
-    }
-
-    fn conjugate(self) -> Self {
-        Self(self.0, -self.1)
-    }
-
-    fn scaled(self, factor: f64) -> Self {
-        Self(self.0 * factor, self.1 * factor)
-    }
-
-    /// The unit number of half the angle, whose real part is not negative.
-    fn halved(self) -> Self {
-        let Self(cos, sin) = self.scaled(1.0 / self.size());
-        if cos >= 0.0 {
-            let half = (0.5 * (1.0 + cos)).sqrt();
-            return Self(half, 0.5 * sin / half);
-        }
-        let half = (0.5 * (1.0 - cos)).sqrt();
-        Self(0.5 * sin.abs() / half, half.copysign(sin))
-    }
-
-    /// Derivative of `Im(k q)`, with this as `k`, by a rotation of the extents.
-    fn by_rotation(self, extents: &DMat3) -> DVec3 {
-        let (first, second) = (extents.x_axis, extents.y_axis);
-        let real = (first.cross(DVec3::X) - second.cross(DVec3::Y)) * 2.0;
-        let imaginary = (second.cross(DVec3::X) + first.cross(DVec3::Y)) * 2.0;
-        real * self.1 + imaginary * self.0
-    }
-
-    /// The same by the extents themselves.
-    fn by_extents(self) -> DMat3 {
-        let diagonal = outer(DVec3::X, DVec3::X) - outer(DVec3::Y, DVec3::Y);
-        let mixed = outer(DVec3::X, DVec3::Y) + outer(DVec3::Y, DVec3::X);
-        diagonal * self.1 + mixed * self.0
-    }
+/// The same by the extents themselves.
+fn by_extents(k: DVec2) -> DMat3 {
+    let diagonal = outer(DVec3::X, DVec3::X) - outer(DVec3::Y, DVec3::Y);
+    let mixed = outer(DVec3::X, DVec3::Y) + outer(DVec3::Y, DVec3::X);
+    diagonal * k.y + mixed * k.x
 }
